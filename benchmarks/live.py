@@ -6,7 +6,7 @@ processor time of this computer, without that of the model; the time of the line
 start of a line.
 
 ``python benchmarks/live.py --angle 30`` prints the errors of previews of the example at an angle, on an operator of
-plays: by that operator, in percent of the size.
+plays: by that operator, in percent of the size; then the same times as without it, of moves at that angle.
 """
 
 import argparse
@@ -23,12 +23,12 @@ sys.path.insert(0, str(HERE.parent / "tests" / "helpers"))  # the line and the d
 from client_line import VirtualLine  # noqa: E402
 from client_rig import client, info_for, model  # noqa: E402
 from replacing import replace  # noqa: E402
-from turned_scans import turned_setup  # noqa: E402
+from turned_scans import turned_setup, write_turned  # noqa: E402
 
 from tablegen.api.live import Live  # noqa: E402
 from tablegen.api.live_preview import LivePreview  # noqa: E402
 from tablegen.config.load import load  # noqa: E402
-from tablegen.link.messages import Feature, More  # noqa: E402
+from tablegen.link.messages import SPLINE_DEGREE, DeviceInfo, Feature, More  # noqa: E402
 from tablegen.link.prepare import PreparedScan  # noqa: E402
 from tablegen.planning.line_plan import make_plan  # noqa: E402
 from tablegen.planning.turned_plan import TurnedPlan, make_turned_plan  # noqa: E402
@@ -58,7 +58,7 @@ def _row(name: str, host_s: list[float], line_s: list[float], sent: list[int]) -
 
 
 def at_angle(angle_deg: float) -> None:
-    """Print what previews of changes at an angle leave, and their processor time beside that of a plan."""
+    """Print what previews at an angle leave, their processor time beside that of a plan, and the times of moves."""
     changes: dict[str, tuple[float, tuple[str, ...]]] = {
         "a move by 5 V": (0.0, ("x.offset_v = 45.0",)),
         "a zoom by 0.8": (0.0, ("x.size_nm = 240", "y.size_nm = 240")),
@@ -74,20 +74,34 @@ def at_angle(angle_deg: float) -> None:
             preview = turned_preview(turned_setup(Path(folder), angle_deg + by_deg, *edits), plan)
             seconds = time.process_time() - start
             errors = preview and f"{preview.x_error_percent:.2f} % of x, {preview.y_error_percent:.2f} % of y"
-            print(f"{name:<22} {errors or 'no preview'}, {seconds:.1f} s")
+            print(f"{name:<22} {errors or 'no preview'}, {seconds:.2f} s")
+        straight = PreparedScan.of_plan(make_plan(load(write_turned(Path(folder), 0.0))))
+        info = info_for(straight)
+        steps = {f"{axis}_limits": replace(getattr(info, f"{axis}_limits"), max_step=1 << 16) for axis in "xy"}
+        slow = {"more": More.SLOW_PARTS, "slow_knots": 17, "slow_index_bits": 6, "degree": SPLINE_DEGREE}
+        print(f"\n{len(MOVES_NM)} moves at {_BAUD} baud, {_WAY_S * 1e3:g} ms each way; medians")
+        moved(write_turned(Path(folder), angle_deg), replace(info, **slow, **steps))  # type: ignore[arg-type]
 
 
 def _image_bytes(plan: TurnedPlan) -> int:
     return len(PreparedScan.of_turned(plan).image("table").data)
 
 
-def moved(path: Path) -> None:
-    """Move a scan, and print the medians."""
-    info = info_for(PreparedScan.of_plan(make_plan(load(path))))
-    info = replace(info, features=info.features | Feature.COMMIT_MODES, more=More.MOVE)
+def moved(path: Path, info: DeviceInfo) -> None:
+    """Move a scan on a device with modes of a COMMIT, and print the medians."""
+    info = replace(info, features=info.features | Feature.COMMIT_MODES)
     line = _TimedLine(model(info), baud=_BAUD, tick_hz=info.update_rate_hz, out_s=_WAY_S, back_s=_WAY_S)
     previews: list[tuple[float, float, int]] = []
+    uploads: list[tuple[float, float, int]] = []
     with client(line) as device:
+        upload = device.upload
+
+        def timed_upload(*arguments: object, **options: object) -> object:
+            result = upload(*arguments, **options)  # type: ignore[arg-type]
+            uploads.append(now())
+            return result
+
+        device.upload = timed_upload  # type: ignore[assignment, method-assign]
         exchange = device._session.exchange
 
         def now() -> tuple[float, float, int]:
@@ -105,7 +119,7 @@ def moved(path: Path) -> None:
         for by_nm in MOVES_NM:
             start = now()
             scan = live.move(by_nm, by_nm)
-            end = now()
+            end = uploads[-1]
             assert scan.preview is not None
             errors.append(max(scan.preview.x_error_percent, scan.preview.y_error_percent))
             for name, at in (("preview", previews[-1]), ("exact", end)):
@@ -130,9 +144,11 @@ def main() -> int:
             text = EXAMPLE.with_name(name).read_text("utf-8")
             Path(folder, name).write_text(re.sub(r"(?ms)^\[limits\].*?(?=^\[|\Z)", "", text), "utf-8")
         print("\nwithout [limits]: the preview does not wait for the certificate")
-        moved(Path(folder) / EXAMPLE.name)
+        path = Path(folder) / EXAMPLE.name
+        info = replace(info_for(PreparedScan.of_plan(make_plan(load(path)))), more=More.MOVE)
+        moved(path, info)
         print("\nwith [limits]")
-        moved(EXAMPLE)
+        moved(EXAMPLE, info)
     return 0
 
 

@@ -78,7 +78,7 @@ def played_frame(plan: TurnedPlan) -> "ImagedFrame":
 def frame_codes(axis: TurnedAxis, ticks: Ints) -> Ints:
     """Return the codes of a frame at some ticks of each line, unshaped, shape (lines, len(ticks))."""
     program = axis.program
-    lines = [program.unclamped(line)[0, ticks] for line in range(program.lines)]
+    lines = [program.at(line, ticks) for line in range(program.lines)]
     return program.output.clamp(np.stack(lines))
 
 

@@ -10,6 +10,7 @@ In line l of a frame, at tick k of L, as docs/decisions/0089 has it::
 Shaping, clamp, slew guard and coding of the converter follow as for every program.
 """
 
+from functools import cached_property
 from itertools import pairwise
 from math import ceil
 
@@ -22,7 +23,7 @@ from tablegen.fixedpoint.phase import PHASE_BITS, RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import saturate, shift_round, signed_limits
 from tablegen.fixedpoint.shaping import Remainders
-from tablegen.fixedpoint.spline import cubic
+from tablegen.fixedpoint.spline import cubic, of_segments, segments
 from tablegen.numerics.arrays import Ints, freeze
 
 RATIO_BITS = 16
@@ -31,6 +32,7 @@ SECOND_BITS = 8
 SLOW_BITS = 43  # of an offset word
 SUM_BITS = 44  # of product and offset before the rounding
 MOST_KNOTS = 65
+_LINES = 1  # of a frame whose codes are computed at a time
 
 
 class Knots(Struct, frozen=True, eq=False):
@@ -106,7 +108,7 @@ class SlowTable(Struct, frozen=True, eq=False):
         return np.asarray(self.gain_word * samples + self.offset_word)
 
 
-class FrameProgram(Struct, frozen=True, eq=False):
+class FrameProgram(Struct, frozen=True, eq=False, dict=True):
     """One axis of a program with a slow part.
 
     ``fast`` has the table of a line and the output stage, whose gain and offset words it does not use. ``second`` has
@@ -181,7 +183,9 @@ class FrameProgram(Struct, frozen=True, eq=False):
 
     def guarded(self, max_step: int) -> "FrameProgram":
         """Return the program with a slew guard of so many codes a tick, 1 at least."""
-        return replace(self, fast=replace(self.fast, output=replace(self.output, max_step=max(max_step, 1))))
+        guarded = replace(self, fast=replace(self.fast, output=replace(self.output, max_step=max(max_step, 1))))
+        guarded.__dict__.update(self.__dict__)  # extremes do not depend on the guard
+        return guarded
 
     def ramps(self) -> Ints:
         """Return by how much the slow part moves in a tick of each line, in the units of an offset word.
@@ -277,6 +281,19 @@ class FrameProgram(Struct, frozen=True, eq=False):
         """
         return self.output.clamp(self.unclamped(0, self.lines))
 
+    @cached_property
+    def extremes(self) -> tuple[int, int, int]:
+        """The least and the greatest code of a frame before the clamp, and the largest step of a tick, unshaped."""
+        least, most, steepest = 1 << 40, -(1 << 40), 0
+        before = int(self.at(self.lines - 1, np.array([self.fast.phase.ticks - 1]))[0])
+        for first in range(0, self.lines, _LINES):
+            codes = self.unclamped(first, min(_LINES, self.lines - first)).ravel()
+            least, most = min(least, int(np.min(codes))), max(most, int(np.max(codes)))
+            steps = np.diff(codes, prepend=before)
+            steepest = max(steepest, int(np.max(steps)), -int(np.min(steps)))
+            before = int(codes[-1])
+        return least, most, steepest
+
     def _ramps(self, first: int, stop: int) -> Ints:
         step = RationalPhase(self.fast.phase.ticks).step
         slow = self.slow.at(np.arange(first, stop + 1), self.lines).tolist()
@@ -286,10 +303,17 @@ class FrameProgram(Struct, frozen=True, eq=False):
         """Return the sums at ticks of lines, shape (count, len(k)); at all ticks unless ``k`` says which."""
         k = np.arange(self.fast.phase.ticks, dtype=np.int64) if k is None else k
         lines = np.arange(first, first + count)
-        samples = np.stack([replace(self.fast, words=self.table(line)).samples(k) for line in lines.tolist()])
+        samples = self._samples(lines.tolist(), k)
         gains, slow = self.gains.at(lines), self.slow.at(lines, self.lines)
         ramps = self._ramps(first, first + count)
         return np.asarray(gains[:, None] * samples + slow[:, None] + k * ramps[:, None])
+
+    def _samples(self, lines: list[int], k: Ints) -> Ints:
+        """Return the samples of the mixed tables of lines at the same ticks of each, shape (len(lines), len(k))."""
+        if self.fast.mode != "cubic":
+            return np.stack([replace(self.fast, words=self.table(line)).samples(k) for line in lines])
+        segment, fraction = segments(self.fast.phase.at(k), self.fast.index_bits)
+        return np.stack([of_segments(self.table(line), segment, fraction) for line in lines])
 
 
 def played_extremes(program: FrameProgram) -> tuple[int, int, int]:
@@ -302,14 +326,7 @@ def played_extremes(program: FrameProgram) -> tuple[int, int, int]:
 
 def frame_extremes(program: FrameProgram) -> tuple[int, int, int]:
     """Return the least and the greatest code of a frame before the clamp, and the largest step of a tick, unshaped."""
-    least, most, steepest = 1 << 40, -(1 << 40), 0
-    before = int(program.unclamped(program.lines - 1)[0, -1])
-    for line in range(program.lines):
-        codes = program.unclamped(line)[0]
-        least, most = min(least, int(np.min(codes))), max(most, int(np.max(codes)))
-        steepest = max(steepest, int(np.max(np.abs(np.diff(codes, prepend=before)))))
-        before = int(codes[-1])
-    return least, most, steepest
+    return program.extremes
 
 
 def ramp(distance: int, step: int) -> int:

@@ -6,6 +6,8 @@ their differences: what a device checks of a table of lines holds for it too.
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from tablegen.fixedpoint.interpolation import index_bits_of
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.rounding import shift_round
@@ -38,10 +40,39 @@ def cubic(table: Ints, phase: Ints) -> Ints:
     Ints
         Samples, shape of ``phase``.
     """
-    index_bits = index_bits_of(len(table))
-    index = phase >> (PHASE_BITS - index_bits)
-    fraction = (phase >> (PHASE_BITS - index_bits - SPLINE_FRACTION_BITS)) & ((1 << SPLINE_FRACTION_BITS) - 1)
+    index, fraction = segments(phase, index_bits_of(len(table)))
     return evaluate_segment([table[(index + ahead) & (len(table) - 1)] for ahead in range(WORDS_BEHIND + 1)], fraction)
+
+
+def segments(phase: Ints, index_bits: int) -> tuple[Ints, Ints]:
+    """Return the segment of each phase in a table of so many index bits, and the fraction of it that is behind."""
+    fraction = (phase >> (PHASE_BITS - index_bits - SPLINE_FRACTION_BITS)) & ((1 << SPLINE_FRACTION_BITS) - 1)
+    return phase >> (PHASE_BITS - index_bits), fraction
+
+
+def of_segments(table: Ints, segment: Ints, fraction: Ints) -> Ints:
+    """Return ``cubic`` of phases that ``segments`` has taken apart: the same integers, faster for many samples.
+
+    Parameters
+    ----------
+    table
+        Coefficients of the B-spline, shape (2^P,).
+    segment, fraction
+        Of each phase, of one shape.
+
+    Returns
+    -------
+    Ints
+        Samples, of that shape.
+    """
+    b0, b1, b2, b3 = coefficients([np.roll(table, -ahead) for ahead in range(WORDS_BEHIND + 1)])
+    sample = b3[segment]
+    for lower in (b2, b1, b0):
+        sample *= fraction
+        sample += 1 << SPLINE_FRACTION_BITS
+        sample >>= SPLINE_FRACTION_BITS + 1
+        sample += lower[segment]
+    return sample
 
 
 def evaluate_segment(words: Sequence[Ints], fraction: Ints) -> Ints:

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import cache
 from math import ceil, floor
 from typing import Literal
 
@@ -359,11 +360,14 @@ def _axis(
     n = np.arange(1.0, motion.harmonics + 1.0)
     response, boost_db = line.drive.response, line.drive.max_boost_db
 
-    def inverse(series: FourierSeries) -> FourierSeries:
-        if response is None:
-            return series
+    @cache
+    def factors() -> tuple[Floats, Floats]:
+        assert response is not None
         real, imaginary, _ = capped_inverse(response, n * rate_hz, boost_db)
-        return series.times(real, imaginary)
+        return real, imaginary
+
+    def inverse(series: FourierSeries) -> FourierSeries:
+        return series if response is None else series.times(*factors())
 
     with problems.at(*mixing_key(setup)):
         try:

@@ -1,6 +1,6 @@
 """A real, periodic, band-limited waveform: w(t) = a0 + sum_n a_n cos(2 pi n t) + b_n sin(2 pi n t)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
 from math import tau
 from typing import TypeVar
@@ -16,6 +16,7 @@ _Real = TypeVar("_Real", float, Floats)
 _BLOCK = 1 << 12  # times that are computed at a time
 _ROTATED = 16  # harmonics from one whose sine is computed to the next
 
+_TOGETHER = 16  # series of one grid that are computed at a time
 _CACHED = 1 << 17  # cosines of one grid that are cached for the next series on it, and as many sines: 2 MB
 
 
@@ -61,6 +62,17 @@ def _sums(a0: float, a: Floats, b: Floats, count: int) -> tuple[Floats, Floats, 
         sums[2] += here
         sums[3] += mirrored
     return sums[0], sums[1], sums[2], sums[3]
+
+
+def _whole(count: int, first: Floats, last: Floats, third: Floats, second: Floats) -> Floats:
+    """Return the values on a grid from those of ``_sums``, along the last axis."""
+    half, quarter = count // 2, count // 4
+    total = np.empty((*first.shape[:-1], count))
+    total[..., : quarter + 1] = first
+    total[..., half - quarter : half + 1] = second[..., ::-1]
+    total[..., half : half + quarter + 1] = third
+    total[..., count - quarter :] = last[..., :0:-1]
+    return total
 
 
 class FourierSeries(Struct, frozen=True, eq=False, dict=True):
@@ -113,14 +125,7 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         if count % 2:
             return self.on_grid(2 * count, derivative)[::2].copy()
         a, b = _differentiated(np.arange(1.0, self.harmonics + 1.0), self.a, self.b, derivative)
-        first, last, third, second = _sums(self.a0 if derivative == 0 else 0.0, a, b, count)
-        half, quarter = count // 2, count // 4
-        total = np.empty(count)
-        total[: quarter + 1] = first
-        total[half - quarter : half + 1] = second[::-1]
-        total[half : half + quarter + 1] = third
-        total[count - quarter :] = last[:0:-1]
-        return total
+        return _whole(count, *_sums(self.a0 if derivative == 0 else 0.0, a, b, count))
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
         """Return harmonic n, or its derivative with respect to t.
@@ -185,6 +190,38 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
             Of the same H harmonics.
         """
         return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)
+
+
+def on_one_grid(series: Sequence[FourierSeries], count: int) -> Floats:
+    """Return ``on_grid`` of several series of as many harmonics, with every bit of it.
+
+    Parameters
+    ----------
+    series
+        At least one.
+    count
+        Points of the period.
+
+    Returns
+    -------
+    Floats
+        Shape (len(series), count).
+    """
+    harmonics, points = series[0].harmonics, count // 4 + 1
+    if count % 2 or harmonics * points > _CACHED or any(one.a0 for one in series):
+        return np.stack([one.on_grid(count) for one in series])
+    cosines, sines = _cached_waves(count, harmonics)
+    rows = []
+    for first in range(0, len(series), _TOGETHER):
+        a, b = (np.stack([getattr(one, name) for one in series[first : first + _TOGETHER]], axis=1) for name in "ab")
+        cosine_terms, sine_terms = cosines[:, None] * a[:, :, None], sines[:, None] * b[:, :, None]
+        terms = cosine_terms + sine_terms, cosine_terms - sine_terms
+        near = [np.add.reduce(part, axis=0, initial=0.0) for part in terms]
+        for part in terms:
+            np.negative(part[::2], out=part[::2])
+        far = [np.add.reduce(part, axis=0, initial=0.0) for part in terms]
+        rows.append(_whole(count, near[0], near[1], far[0], far[1]))
+    return np.concatenate(rows)
 
 
 def _differentiated(n: _Real, a: _Real, b: _Real, derivative: int) -> tuple[_Real, _Real]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.rounding import signed_limits
-from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, SPLINE_UNIT, cubic, evaluate_segment
+from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, SPLINE_UNIT, cubic, evaluate_segment, of_segments, segments
 from tablegen.fixedpoint.spline_words import spline_factors
 from tablegen.waveform.series import FourierSeries
 
@@ -100,3 +100,11 @@ def test_the_error_is_that_of_the_projection(harmonic: int, length: int) -> None
     wanted = 2.0 * series.value(np.array([float(one) for one in at]) / length) - 1.0
     bound = (2 * np.pi * harmonic / length) ** 4 / 720
     assert 0.98 * bound < np.abs(played - wanted).max() < 1.02 * bound
+
+
+@pytest.mark.parametrize(("index_bits", "bits"), [(3, 21), (6, 16), (7, 8)])
+def test_a_sample_of_segments_is_that_of_its_phase(index_bits: int, bits: int) -> None:
+    random = np.random.default_rng(bits)
+    low, high = signed_limits(bits)
+    table, phase = random.integers(low, high, 1 << index_bits, endpoint=True), random.integers(0, 1 << 32, 5000)
+    assert (of_segments(table, *segments(phase, index_bits)) == cubic(table, phase)).all()

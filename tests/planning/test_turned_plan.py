@@ -179,6 +179,9 @@ def test_the_slew_guard_does_not_act(tmp_path: Path) -> None:
         output = axis.program.output
         assert output.code_min <= least < most <= output.code_max
         assert steepest * 2 == output.max_step
+        codes = axis.program.unclamped(0, axis.program.lines).ravel()
+        steps = np.abs(codes - np.roll(codes, 1))
+        assert (least, most, steepest) == (np.min(codes), np.max(codes), np.max(steps))
 
 
 def test_other_plans_refuse_what_mixes_motions(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.turns import sine_and_cosine
 from tablegen.waveform import series as module
-from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.series import FourierSeries, on_one_grid
 
 
 def random_series(harmonics: int, seed: int) -> FourierSeries:
@@ -71,3 +71,13 @@ def test_the_comparison_sees_one_harmonic_that_is_off() -> None:
     wrong[7] *= 1.0 + 1e-13
     off = FourierSeries(series.a0, wrong, series.b).on_grid(256)
     assert off.tobytes() != plain_sum(series, 256, 0).tobytes()
+
+
+@pytest.mark.parametrize("harmonics", [1, 12, 63])
+def test_series_on_one_grid_are_those_of_each(harmonics: int) -> None:
+    """Bit for bit; also of an odd grid, of means, and of more waves than are cached."""
+    random = np.random.default_rng(harmonics)
+    for count, mean in ((256, 0.0), (250, 0.0), (255, 0.0), (64, 0.1), (1 << 14, 0.0)):
+        series = [FourierSeries(mean, *random.normal(size=(2, harmonics))) for _ in range(19)]
+        expected = np.stack([one.on_grid(count) for one in series])
+        assert on_one_grid(series, count).tobytes() == expected.tobytes()

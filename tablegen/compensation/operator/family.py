@@ -50,6 +50,15 @@ class Family:
         loop = self.bouc_wen
         return rising + loop.branch(u, low, high, True), falling + loop.branch(u, low, high, False)
 
+    def branch_of_loops(self, u: Floats, low: Floats, high: Floats, rising: bool) -> Floats:
+        """Return ``branch`` of several loops, a row of drives for each: shapes (loops, n) and (loops,)."""
+        displacement = self.plays.branch_of_loops(u, low, high, rising)
+        if self.bouc_wen is not None:
+            ends = zip(low.tolist(), high.tolist(), strict=True)
+            for row, drives, (least, most) in zip(displacement, u, ends, strict=True):
+                row += self.bouc_wen.branch(drives, least, most, rising)
+        return displacement
+
     def at_decades(self, decades: float) -> "Family":
         """Return the family at a rate so many decades above that of its thresholds."""
         return _at_decades(self, decades) if self.plays.growth else self

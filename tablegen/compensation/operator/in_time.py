@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from tablegen.compensation.dynamics import Measured, Response, SecondOrder
 from tablegen.compensation.operator.bias_in_time import Periods, remembered
 from tablegen.compensation.operator.bias_memory import BiasMemory
 from tablegen.compensation.operator.loop import Loop
+from tablegen.compensation.operator.loop_stretches import LoopStretch, positions_on
 from tablegen.compensation.operator.measured_in_time import behind_measured
 from tablegen.compensation.operator.operator import Operator
 from tablegen.numerics.arrays import Floats
@@ -139,13 +141,13 @@ class OperatorInTime:
         low, high = float(np.min(u)), float(np.max(u))
         if start is not Start.SETTLED:
             low, high = min(low, 0.0), self._reach(high)
-        memory = _Memory(self.operator, self.factor_at(mean), mean, low, high)
+        memory = _Memory(self.operator, self.operator.loop(low, high, self.factor_at(mean), mean))
         if start is not Start.SETTLED:
-            memory.move(np.array([low, float(u[0])]))
+            memory.play(np.array([low, float(u[0])]))
         before = {Start.SETTLED: len(u), Start.LINE: repeated, Start.REST: 0}[start]
         if before:
-            _along(memory, np.append(u[:before], u[0]))
-        return _along(memory, u)
+            memory.play(np.append(u[:before], u[0]))
+        return memory.positions(u)
 
 
 def mean_of(time_s: Floats, u: Floats) -> float:
@@ -203,15 +205,19 @@ def late_mode(time_s: Floats, y: Floats, tau_s: complex, repeated: int) -> NDArr
     decay = np.exp(-x)
     lost = -np.expm1(-x)
     first = np.where(np.abs(x) > 1e-5, lost / x, 1.0 - 0.5 * x)  # share of the first y beyond the decay
-    gain = np.concatenate([[0.0], (first - decay) * y[:-1] + (1.0 - first) * y[1:]]).astype(np.complex128)
-    factor = np.concatenate([[1.0], decay]).astype(np.complex128)
+    # Real numbers of a real mode have the bits of complex ones whose imaginary parts are 0.
+    gain = np.concatenate([[0.0], (first - decay) * y[:-1] + (1.0 - first) * y[1:]])
+    factor = np.concatenate([[1.0], decay])
     step = 1
     while step < len(y):  # states over ever longer stretches: as many rounds as the length has binary digits
         gain[step:] = gain[step:] + factor[step:] * gain[:-step]
         factor[step:] = factor[step:] * factor[:-step]
         step *= 2
-    begin = gain[repeated - 1] / (1.0 - factor[repeated - 1]) if repeated else y[0]
-    out: NDArray[np.complex128] = gain + factor * begin
+    begin = np.complex128(y[0])
+    if repeated:  # a complex division of real numbers rounds otherwise than a real one
+        begin = np.complex128(gain[repeated - 1]) / (1.0 - np.complex128(factor[repeated - 1]))
+    first_state = begin if np.iscomplexobj(gain) else begin.real
+    out: NDArray[np.complex128] = np.asarray(gain + factor * first_state, dtype=np.complex128)
     return out
 
 
@@ -241,64 +247,132 @@ def resonance_modes(response: SecondOrder) -> tuple[list[complex], list[complex]
     return [-1.0 / pole for pole in poles], gains
 
 
+class _Turn:
+    """A drive at which an axis has been, and its position, once that is known."""
+
+    __slots__ = ("u", "y")
+
+    def __init__(self, u: float, y: float = np.nan) -> None:
+        self.u, self.y = u, y
+
+
+class _Piece(NamedTuple):
+    """Samples of a way that are on a branch between two turns; ``stretch`` is the number of their positions."""
+
+    first: int
+    until: int
+    last: _Turn
+    aim: _Turn
+    stretch: int
+    reaches: bool
+
+
+class _Way(NamedTuple):
+    """A monotone way of so many samples: from ``start`` to ``end``, along the branches of its pieces."""
+
+    begin: int
+    samples: int
+    start: _Turn
+    end: _Turn
+    pieces: list[_Piece]
+
+
 class _Memory:
-    """Turns that count, outermost first, and the branches between them."""
+    """Turns that count, outermost first, and the branches between them.
 
-    def __init__(self, operator: Operator, factor: float, mean: float, low: float, high: float) -> None:
-        self._operator, self._factor, self._mean = operator, factor, mean
-        self._loops: dict[tuple[float, float], Loop] = {}
-        extent = self._loop(low, high).extent_nm
-        self._turns = [(high, extent), (low, 0.0)]
+    Which branches an axis runs along depends on the drive alone. So all ways are found first, then the positions on
+    all branches together, and at last those of the axis, way by way.
+    """
+
+    def __init__(self, operator: Operator, widest: Loop) -> None:
+        self._operator, self._widest = operator, widest
+        self._turns = [_Turn(widest.high, widest.extent_nm), _Turn(widest.low, 0.0)]
         self._rising = True
-        self._at = low, 0.0
+        self._at = _Turn(widest.low, 0.0)
+        self._ways: list[_Way] = []
+        self._stretches: list[LoopStretch] = []
+        self._numbers: dict[tuple[float, ...], int] = {}
 
-    def move(self, u: Floats) -> Floats:
-        """Return the positions along a monotone stretch, whose first drive is where the axis is."""
-        rising = bool(u[-1] > u[0]) if u[-1] != u[0] else self._rising
+    def play(self, u: Floats) -> None:
+        """Go along a drive, which begins where the axis is."""
+        for begin, end in pairwise(turns_of(u)):
+            part = u[begin : end + 1]
+            running = np.maximum.accumulate(part) if part[-1] >= part[0] else np.minimum.accumulate(part)
+            self._ways.append(self._way(begin, running))
+
+    def positions(self, u: Floats) -> Floats:
+        """Go along a drive, and return its positions in nm."""
+        before = len(self._ways)
+        self.play(u)
+        shares = self._shares()
+        out = np.empty(len(u))
+        for number, way in enumerate(self._ways):
+            positions = _positions_of(way, shares)
+            way.end.y = float(positions[-1])
+            if number >= before:
+                out[way.begin : way.begin + way.samples] = positions
+        return out
+
+    def _way(self, begin: int, u: Floats) -> _Way:
+        """Go a monotone way, whose first drive is where the axis is."""
+        first_u, last_u = float(u[0]), float(u[-1])
+        rising = last_u > first_u if last_u != first_u else self._rising
         if rising != self._rising:
-            if self._at[0] != self._turns[-1][0]:
+            if self._at.u != self._turns[-1].u:
                 self._turns.append(self._at)
             self._rising = rising
-        out = np.full(len(u), self._at[1])
-        first = 1
-        sign = 1.0 if rising else -1.0
+        way = _Way(begin, len(u), self._at, _Turn(last_u), [])
+        first, sign = 1, 1.0 if rising else -1.0
+        ascending = u if rising else -u
         while first < len(u):
-            (last, y_last), (aim, y_aim) = self._turns[-1], self._turns[-2]
-            until = first + int(np.searchsorted(sign * u[first:], sign * aim, side="right"))
+            last, aim = self._turns[-1], self._turns[-2]
+            until = first + int(ascending[first:].searchsorted(sign * aim.u, side="right"))
             if until > first:
-                loop = self._loop(min(last, aim), max(last, aim))
-                here = loop.position(u[first:until], rising)
-                share = here if rising else 1.0 - here
-                out[first:until] = y_last + (y_aim - y_last) * share
-                if u[until - 1] == aim:  # the branches of a measured loop have a gap there, which lines would add up
-                    out[until - 1] = y_aim
+                # The branches of a measured loop have a gap at its end, which lines would add up.
+                reaches = bool(u[until - 1] == aim.u)
+                stretch = self._stretch(begin, first, until, last.u, aim.u, rising, u)
+                way.pieces.append(_Piece(first, until, last, aim, stretch, reaches))
             first = until
-            if first < len(u) or u[-1] == aim:
+            if first < len(u) or last_u == aim.u:
                 if len(self._turns) > 2:
                     del self._turns[-2:]
                     if len(self._turns) == 1:  # on the widest loop again, at one of its ends
-                        self._turns.append((aim, y_aim))
+                        self._turns.append(aim)
                 else:
                     self._turns.reverse()
                     break
-        self._at = float(u[-1]), float(out[-1])
-        return out
+        self._at = way.end
+        return way
 
-    def _loop(self, low: float, high: float) -> Loop:
-        key = low, high
-        if key not in self._loops:
-            self._loops[key] = self._operator.loop(low, high, self._factor, self._mean)
-        return self._loops[key]
+    def _stretch(self, begin: int, first: int, until: int, last: float, aim: float, rising: bool, u: Floats) -> int:
+        """Return the number of a stretch; a drive that repeats goes along the same ones again."""
+        key, drives = (begin, first, until, last, aim), u[first:until]
+        number = self._numbers.get(key)
+        if number is None or not np.array_equal(self._stretches[number].u, drives):
+            self._numbers[key] = number = len(self._stretches)
+            self._stretches.append(LoopStretch(min(last, aim), max(last, aim), rising, drives))
+        return number
+
+    def _shares(self) -> list[Floats]:
+        """Return by which share of its way from turn to turn the axis has gone, on each stretch."""
+        widest, stretches = self._widest, self._stretches
+        inner = [one for one in stretches if (one.low, one.high) != (widest.low, widest.high)]
+        positions = iter(positions_on(self._operator, inner))
+        shares = []
+        for one in stretches:
+            on_widest = (one.low, one.high) == (widest.low, widest.high)
+            here = widest.position(one.u, one.rising) if on_widest else next(positions)
+            shares.append(here if one.rising else 1.0 - here)
+        return shares
 
 
-def _along(memory: _Memory, u: Floats) -> Floats:
-    """Return the positions along a drive, which begins where the memory is."""
-    out = np.empty(len(u))
-    turns = turns_of(u)
-    for begin, end in pairwise(turns):
-        part = u[begin : end + 1]
-        running = np.maximum.accumulate(part) if part[-1] >= part[0] else np.minimum.accumulate(part)
-        out[begin : end + 1] = memory.move(running)
+def _positions_of(way: _Way, shares: list[Floats]) -> Floats:
+    """Return the positions in nm along a way whose turns are known."""
+    out = np.full(way.samples, way.start.y)
+    for first, until, last, aim, stretch, reaches in way.pieces:
+        out[first:until] = last.y + (aim.y - last.y) * shares[stretch]
+        if reaches:
+            out[until - 1] = aim.y
     return out
 
 

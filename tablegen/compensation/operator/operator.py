@@ -23,8 +23,8 @@ SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is tak
 STROKE_REACH = 0.05  # of v_max: an operator serves strokes this far beyond the largest that was measured
 _MOST_MISFIT = 1.5e-3  # rms of the lines' residuals; 7e-4 and less where a family fits, 3.6e-3 for Duhem's piezo
 _INSIDE = np.linspace(-0.8, 0.8, 81)  # -1 and 1 are the turns
-_END_POINTS = 48  # of a branch at either end
-_LEAST_SLOPE = 0.05  # of a straight line's; below it a branch nearly stands still, and cannot be inverted
+END_POINTS = 48  # of a branch at either end
+LEAST_SLOPE = 0.05  # of a straight line's; below it a branch nearly stands still, and cannot be inverted
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,23 +96,42 @@ class Operator:
         Unphysical
             If a branch would stand still or run backwards.
         """
+        shape = self._shape(low, high)
         stroke, centre = high - low, 0.5 * (low + high)
-        rising, falling = _branches(self.family, low, high)
-        row = self.residual.at(stroke, centre)
-        half = len(row) // 2
-        of_rising, of_falling = chebyshev(row.reshape(2, half).T[:, :, None], 2.0 * _GRID - 1.0)
-        rising, falling = rising + of_rising, falling + of_falling
-        rising, falling = _closed(rising, falling)
         mean = centre if mean is None else mean
         extent = self.expected_extent(stroke, mean, factor) * (1.0 + float(self.size.at(stroke, mean)[0]))
-        loop = Loop(low, high, _monotonic_ends(rising), _monotonic_ends(falling), extent)
-        loop = structs.replace(loop, extent_nm=extent * (1.0 + loop.grown(mean)))
-        if not loop.least_slope > 0.5 * _LEAST_SLOPE:
+        loop = structs.replace(shape, extent_nm=extent * (1.0 + shape.grown(mean)))
+        self._check_slope(loop)
+        return loop
+
+    def shape(self, low: float, high: float) -> Loop:
+        """Return ``loop`` without its size: its extent is 1 nm.
+
+        Raises
+        ------
+        Unphysical
+            If a branch would stand still or run backwards.
+        """
+        shape = self._shape(low, high)
+        self._check_slope(shape)
+        return shape
+
+    def _shape(self, low: float, high: float) -> Loop:
+        rising, falling = _branches(self.family, low, high)
+        row = self.residual.at(high - low, 0.5 * (low + high))
+        half = len(row) // 2
+        of_rising, of_falling = chebyshev(row.reshape(2, half).T[:, :, None], 2.0 * GRID - 1.0)
+        rising, falling = rising + of_rising, falling + of_falling
+        rising, falling = _closed(rising, falling)
+        return Loop(low, high, _monotonic_ends(rising), _monotonic_ends(falling), 1.0)
+
+    def _check_slope(self, loop: Loop) -> None:
+        if not loop.least_slope > 0.5 * LEAST_SLOPE:
+            stroke, centre = loop.high - loop.low, 0.5 * (loop.low + loop.high)
             raise Unphysical(
                 f"at a stroke of {stroke:.3g} and a centre of {centre:.3g} of v_max the operator's branches run "
                 f"{'backwards' if loop.least_slope < 0.0 else 'nearly flat'}; measure a trace there"
             )
-        return loop
 
     def expected_extent(self, stroke: float, centre: float, factor: float) -> float:
         """Return the nm between the turns, by the family and the offset law, without the field of sizes."""
@@ -133,13 +152,13 @@ class Operator:
         return self.family.extent(SMALL_STROKE, self.centre) / SMALL_STROKE
 
 
-_GRID = np.arange(POINTS) / (POINTS - 1)
+GRID = np.arange(POINTS) / (POINTS - 1)
 
 
 @lru_cache(maxsize=512)  # while lengths are chosen, the same loops come again and again
 def _branches(family: Family, low: float, high: float) -> tuple[Floats, Floats]:
     """Return both branches of the family from 0 to 1."""
-    u = low + (high - low) * _GRID
+    u = low + (high - low) * GRID
     rising, falling = family.branches(u, low, high)
     extent = float(rising[-1] - rising[0])
     return (rising - rising[0]) / extent, (falling - rising[0]) / extent
@@ -161,16 +180,16 @@ def _closed(rising: Floats, falling: Floats) -> tuple[Floats, Floats]:
 
 
 def _monotonic_ends(branch: Floats) -> Floats:
-    """Return the branch with its outermost parts, which are not imaged, no flatter than ``_LEAST_SLOPE``.
+    """Return the branch with its outermost parts, which are not imaged, no flatter than ``LEAST_SLOPE``.
 
     The series of the residual follows the noise there.
     """
     out = branch.copy()
-    step = _LEAST_SLOPE / (POINTS - 1)
-    ends = _END_POINTS
+    step = LEAST_SLOPE / (POINTS - 1)
+    ends = END_POINTS
     if (out[:ends] <= out[1 : ends + 1] - step).all() and (out[-ends:] >= out[-ends - 1 : -1] + step).all():
         return out  # nothing of it is flatter
-    for i in range(_END_POINTS, 0, -1):
+    for i in range(END_POINTS, 0, -1):
         out[i - 1] = min(out[i - 1], out[i] - step)
         out[-i] = max(out[-i], out[-i - 1] + step)
     return out

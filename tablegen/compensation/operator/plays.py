@@ -13,6 +13,7 @@ from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.elementary import exp
 
 _LN10 = 2.302585092994046
+_FEW = 16  # drives for which one array of all plays is faster than a play at a time
 BENDS = 4  # numbers that bend both envelopes of a play
 # l and s of two envelopes, of which the lower one pushes where the drive rises: u, u^2 and 1 - (1 - u)^2, both alike.
 FIXED_BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [1.0, 0.0, 1.0, 0.0]])
@@ -143,6 +144,8 @@ class Plays:
         for coefficient in self.reversible:
             power = power * u
             total = total + float(coefficient) * power
+        if u.ndim == 1 and u.size <= _FEW:
+            return [self._at_few(total, u, low, high, rising) for rising in ways]
         totals = [total.copy() for _ in ways]
         # Row by row in one buffer: a table of all plays would leave the cache, and take three times as long.
         row = np.empty_like(u)
@@ -168,6 +171,75 @@ class Plays:
                     row *= weight
                     total += row
         return totals
+
+    def _at_few(self, total: Floats, u: Floats, low: float, high: float, rising: bool) -> Floats:
+        """Return ``total`` with the plays of a branch: all of them at once, added one after the other."""
+        thresholds, sums = self.stretch * self.thresholds, total[None]
+        for bend, weights in zip(self.bends, self.weights, strict=True):
+            some = np.flatnonzero(weights)
+            if not len(some):
+                continue
+            lower, upper = envelopes(u, bend)
+            least, most = _inner_ends(low, high, bend)
+            r, weight = thresholds[some, None], weights[some, None]
+            moving = np.maximum(lower - r, least + r) if rising else np.minimum(upper + r, most - r)
+            positions = np.where(2.0 * r < most - least, moving, 0.5 * (least + most))
+            sums = np.add.accumulate(np.concatenate([sums, weight * positions]), axis=0)[-1:]
+        return np.asarray(sums[0])
+
+    def branch_of_loops(self, u: Floats, low: Floats, high: Floats, rising: bool) -> Floats:
+        """Return ``branch`` of several loops, with every bit of it.
+
+        Parameters
+        ----------
+        u
+            Normalised drives, a row for each loop, shape (loops, n).
+        low, high
+            Normalised drives at the ends of each loop, shape (loops,).
+        rising
+            True for the branches on which the drive rises.
+
+        Returns
+        -------
+        Floats
+            In units of the displacement, shape of ``u``.
+        """
+        power, total, row = np.ones_like(u), np.zeros_like(u), np.empty_like(u)
+        for coefficient in self.reversible:
+            power = power * u
+            total = total + float(coefficient) * power
+        thresholds = self.stretch * self.thresholds
+        for bend, weights in zip(self.bends, self.weights.tolist(), strict=True):
+            if not any(weights):
+                continue
+            least, most = envelopes(low, bend)[1], envelopes(high, bend)[0]
+            # What a play goes on from, and where it stands still: no drive pushes it out of there.
+            at = least[:, None] + thresholds if rising else most[:, None] - thresholds
+            moving = 2.0 * thresholds < (most - least)[:, None]
+            at = np.where(moving, at, (0.5 * (least + most))[:, None])
+            edge = envelopes(u, bend)[0 if rising else 1].copy()
+            # Thresholds ascend: a play stands still where one of a smaller threshold does.
+            stops = np.sum(moving, axis=1).tolist()
+            last = max(stops)
+            standing: dict[int, list[int]] = {}
+            for loop, stop in enumerate(stops):
+                standing.setdefault(stop, []).append(loop)
+            columns = [at[:, number, None] for number in range(len(thresholds))]
+            for number, (threshold, weight) in enumerate(zip(thresholds.tolist(), weights, strict=True)):
+                if number in standing:
+                    edge[standing[number]] = -np.inf if rising else np.inf
+                if not weight:
+                    continue
+                if number >= last:
+                    total += weight * columns[number]
+                    continue
+                if rising:
+                    np.maximum(np.subtract(edge, threshold, out=row), columns[number], out=row)
+                else:
+                    np.minimum(np.add(edge, threshold, out=row), columns[number], out=row)
+                row *= weight
+                total += row
+        return total
 
 
 NO_PLAYS = Plays(np.zeros(0), np.zeros((1, 0)), np.ones(1), FIXED_BENDS[:1])

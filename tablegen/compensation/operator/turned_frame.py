@@ -14,16 +14,17 @@ part is as smooth as its harmonics allow.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.operator.frame_layer import FrameLayer
 from tablegen.compensation.operator.in_time import OperatorInTime
-from tablegen.numerics.arrays import Bools, Floats, Ints, tree_sum
+from tablegen.numerics.arrays import Bools, Floats, Ints, freeze, tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import sine_and_cosine
-from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.series import FourierSeries, on_one_grid
 
 _SAMPLES_PER_HARMONIC = 8
 _LEAST_SAMPLES = 256  # of a line
@@ -242,8 +243,7 @@ class _LinearFrame:
         self._count = count
         self._t = np.arange(count) / count
         self._inside = motion.inside(self._t)
-        basis = _waves(self._t, motion.harmonics)
-        self._project = _projection(basis[:, self._inside], self._edges(), motion.harmonics)
+        self._project = _projection(self._t[self._inside], self._edges(), motion.harmonics)
         starts = np.arange(motion.lines) / motion.lines
         self._slow_start = _SlowFit(starts[motion.imaged], motion.slow_harmonics)
 
@@ -295,11 +295,9 @@ class _FrameLearner(_LinearFrame):
         harmonics = self._motion.harmonics
         start = slow.on_grid(self._motion.lines)
         rise = np.roll(start, -1) - start
-        rows = [
-            self._inverse(FourierSeries(0.0, row[:harmonics].copy(), row[harmonics:].copy())).on_grid(self._count)
-            for row in lines
-        ]
-        return np.asarray(start[:, None] + rise[:, None] * self._t + np.array(rows)).ravel()
+        series = [self._inverse(FourierSeries(0.0, row[:harmonics].copy(), row[harmonics:].copy())) for row in lines]
+        rows = on_one_grid(series, self._count)
+        return np.asarray(start[:, None] + rise[:, None] * self._t + rows).ravel()
 
     def missing(self, u: Floats) -> Floats:
         """Return the distance to the target at the imaged samples in nm, without its mean, shape (imaged, inside)."""
@@ -368,7 +366,7 @@ class _SlowFit:
     def __init__(self, phases: Floats, harmonics: int) -> None:
         weight = np.full(len(phases), 1.0 / len(phases))
         self._harmonics = harmonics
-        self._rows = _projection(_waves(phases, harmonics), weight, harmonics)
+        self._rows = _projection(phases, weight, harmonics)
 
     def of(self, values: Floats) -> FourierSeries:
         """Return the series for values at the phases, shape (phases,)."""
@@ -418,15 +416,26 @@ def _waves(t: Floats, harmonics: int) -> Floats:
     return np.concatenate([np.ones((1, len(t))), cosines, sines])
 
 
-def _projection(basis: Floats, weight: Floats, harmonics: int) -> Floats:
-    """Return rows whose sums with values are the coefficients of the best smooth series, shape of ``basis``."""
+def _projection(t: Floats, weight: Floats, harmonics: int) -> Floats:
+    """Return rows whose sums with values at phases are the coefficients of the best smooth series.
+
+    Its shape is (2 harmonics + 1, len(t)).
+    """
+    return _projection_of(t.tobytes(), weight.tobytes(), harmonics)
+
+
+@lru_cache(maxsize=12)  # both axes have the same, and so have the changes of a session
+def _projection_of(t: bytes, weights: bytes, harmonics: int) -> Floats:
+    basis, weight = _waves(np.frombuffer(t), harmonics), np.frombuffer(weights)
     n = np.arange(1.0, harmonics + 1.0)
     square = n * n
     penalty = _SMOOTHNESS * np.concatenate([[0.0], square * square, square * square])
     normal = np.array([tree_sum(basis * (row * weight)) for row in basis])
     factor = Cholesky(normal + np.diag(penalty + 1e-14))
     weighted = basis * weight
-    return np.stack([factor.solve(column) for column in weighted.T], axis=-1)
+    rows = np.stack([factor.solve(column) for column in weighted.T], axis=-1)
+    freeze(rows)
+    return rows
 
 
 def _two_products(rows: Floats) -> tuple[Floats, Floats, Floats, Floats]:
