@@ -315,13 +315,13 @@ class Live:
         """
         every = other_settings(self._scan.settings, settings)
         variant, setup = self._variant(every)
-        before, asked = self._scan.setup, setup
+        before, target = self._scan.setup, setup
         for tilt in self._scan.plan.tilts:
             key = offset_key(tilt.name)
-            if tilt.name not in asked.scan.tilts or key in settings:
+            if tilt.name not in target.scan.tilts or key in settings:
                 continue
-            offset_v = followed_offset_v(before, asked, tilt.name)
-            if offset_v != asked.scan.tilts[tilt.name].offset_v:
+            offset_v = followed_offset_v(before, target, tilt.name)
+            if offset_v != target.scan.tilts[tilt.name].offset_v:
                 every = {**every, key: offset_v}
                 variant, setup = self._variant(every)
                 check_room(tilt, before, setup, settings)
