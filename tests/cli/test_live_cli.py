@@ -112,6 +112,7 @@ def test_a_scan_is_moved_zoomed_and_changed(info: DeviceInfo, file: Path) -> Non
         "moved": False,
         **{axis: {key: slower["scan"][axis][key] for key in ("position_nm", "size_nm")} for axis in "xy"},
         "z": None,
+        "aux": None,
     }
     words = [(line.program.output, line.program.words.tolist()) for line in same.lines]
     device_words = Bench(model(info, boot=BOOT))
