@@ -32,6 +32,7 @@ from tilted_scans import (
 from tablegen.api.live import Live
 from tablegen.api.live_tilt import followed_offset_v
 from tablegen.config.load import Setup, load
+from tablegen.config.schema import TiltName
 from tablegen.link.errors import LinkLost
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import Request
@@ -142,26 +143,26 @@ def test_what_is_played_about_moves_is_one_plane(straight: Path) -> None:
     check_plane(play_moves(straight))
 
 
-def _fixed(before: Setup, after: Setup) -> float:
+def _fixed(before: Setup, after: Setup, _: TiltName = "z") -> float:
     """A plane that does not follow a move."""
     assert after.scan.z is not None
     assert before.scan.z is not None
     return before.scan.z.offset_v
 
 
-def _mirrored(before: Setup, after: Setup) -> float:
+def _mirrored(before: Setup, after: Setup, _: TiltName = "z") -> float:
     """A plane of the wrong sign."""
     return 2.0 * _fixed(before, after) - followed_offset_v(before, after)
 
 
-def _exchanged(before: Setup, after: Setup) -> float:
+def _exchanged(before: Setup, after: Setup, _: TiltName = "z") -> float:
     """A plane whose slopes are exchanged."""
     assert after.scan.z is not None
     z = replace(after.scan.z, slope_x=after.scan.z.slope_y, slope_y=after.scan.z.slope_x)
     return followed_offset_v(before, replace(after, scan=replace(after.scan, z=z)))
 
 
-def _in_nm(before: Setup, after: Setup) -> float:
+def _in_nm(before: Setup, after: Setup, _: TiltName = "z") -> float:
     """A plane in nm in place of volts."""
     return _fixed(before, after) + NM_PER_V * (followed_offset_v(before, after) - _fixed(before, after))
 
