@@ -77,8 +77,8 @@ class LiveScan:
 
     ``swap`` is the mode in which it took the place of the scan before: ``keep`` where the frame went on; None where
     the device played it already. ``generation`` counts the programs of the device. ``preview`` is what played first,
-    None without one. ``z`` is the output on a tilted sample and ``aux`` the second one,
-    None without them.
+    None without one. ``z`` is the output on a tilted sample and ``aux`` the second one, None
+    without them.
     """
 
     name: str
@@ -176,8 +176,7 @@ class Live:
 
     A scan may have the output z, on a device with ``DAC_LINK_Z``: z, and the second output aux, stay on their planes
     through all moves, so that each gives them another voltage in the centre of the scan. A move beyond their range is
-    refused. Such a
-    device has no ``DAC_MOVE``.
+    refused. Such a device has no ``DAC_MOVE``.
     """
 
     def __init__(
@@ -306,25 +305,28 @@ class Live:
             raise
 
     def _followed(self, settings: dict[str, Any]) -> tuple[dict[str, Any], Variant, Setup]:
-        """Return all settings, the variant and the setup of a change, whose z is on the plane of the scan before.
+        """Return all settings, the variant and the setup of a change, whose z and aux stay on the planes before it.
 
         Raises
         ------
         Rejected
-            If a key is wrong, or the change is a move that leaves the range of an axis or of z.
+            If a key is wrong, or the change is a move that leaves the range of an axis, of z or of aux.
         """
         every = other_settings(self._scan.settings, settings)
         variant, setup = self._variant(every)
-        before, target = self._scan.setup, setup
-        for tilt in self._scan.plan.tilts:
-            key = offset_key(tilt.name)
-            if tilt.name not in target.scan.tilts or key in settings:
-                continue
-            offset_v = followed_offset_v(before, target, tilt.name)
-            if offset_v != target.scan.tilts[tilt.name].offset_v:
-                every = {**every, key: offset_v}
-                variant, setup = self._variant(every)
-                check_room(tilt, before, setup, settings)
+        before, volts = self._scan.setup, {name: tilt.offset_v for name, tilt in setup.scan.tilts.items()}
+        shifts = {
+            tilt: offset_v
+            for tilt in self._scan.plan.tilts
+            if tilt.name in volts and offset_key(tilt.name) not in settings
+            if (offset_v := followed_offset_v(before, setup, tilt.name)) != volts[tilt.name]
+        }
+        if not shifts:
+            return every, variant, setup
+        every = {**every, **{offset_key(tilt.name): offset_v for tilt, offset_v in shifts.items()}}
+        variant, setup = self._variant(every)
+        for tilt in shifts:
+            check_room(tilt, before, setup, settings)
         return every, variant, setup
 
     def _variant(self, settings: dict[str, Any]) -> tuple[Variant, Setup]:
