@@ -24,7 +24,7 @@ from soft_core_device import BAUD, EXAMPLE, UPDATE_RATE_HZ, Device, Host, compil
 from turned_scans import write_turned
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.fixedpoint.frame_program import FrameProgram, frame_extremes
+from tablegen.fixedpoint.frame_program import FrameProgram
 from tablegen.link.acceptance import first_objection
 from tablegen.link.messages import DeviceState, More, Reason, Request
 from tablegen.link.prepare import PreparedScan
@@ -181,7 +181,7 @@ def with_slow_word(scan: PreparedScan, axis: str, number: int) -> ProgramImage:
     program = getattr(scan.program, axis)
     words = np.array(program.slow.words)
     words[number] = 32_767
-    least, most, _ = frame_extremes(program)
+    least, most, _ = program.extremes
     output = replace(program.output, code_min=least, code_max=most, park_code=most)
     changed = replace(program, fast=replace(program.fast, output=output), slow=replace(program.slow, words=words))
     return make_image(replace(scan.program, **{axis: changed}), scan.digest)

@@ -32,7 +32,6 @@ SECOND_BITS = 8
 SLOW_BITS = 43  # of an offset word
 SUM_BITS = 44  # of product and offset before the rounding
 MOST_KNOTS = 65
-_LINES = 1  # of a frame whose codes are computed at a time
 
 
 class Knots(Struct, frozen=True, eq=False):
@@ -286,8 +285,8 @@ class FrameProgram(Struct, frozen=True, eq=False, dict=True):
         """The least and the greatest code of a frame before the clamp, and the largest step of a tick, unshaped."""
         least, most, steepest = 1 << 40, -(1 << 40), 0
         before = int(self.at(self.lines - 1, np.array([self.fast.phase.ticks - 1]))[0])
-        for first in range(0, self.lines, _LINES):
-            codes = self.unclamped(first, min(_LINES, self.lines - first)).ravel()
+        for line in range(self.lines):
+            codes = self.unclamped(line)[0]
             least, most = min(least, int(np.min(codes))), max(most, int(np.max(codes)))
             steps = np.diff(codes, prepend=before)
             steepest = max(steepest, int(np.max(steps)), -int(np.min(steps)))
@@ -318,15 +317,10 @@ class FrameProgram(Struct, frozen=True, eq=False, dict=True):
 
 def played_extremes(program: FrameProgram) -> tuple[int, int, int]:
     """Return bounds of the codes of all frames before the clamp, and of the step of a tick, with what shaping adds."""
-    least, most, steepest = frame_extremes(program)
+    least, most, steepest = program.extremes
     shaping = program.output.shaping
     room = ceil(shaping.excess - 0.5)
     return least - room, most + room, steepest + shaping.step_excess
-
-
-def frame_extremes(program: FrameProgram) -> tuple[int, int, int]:
-    """Return the least and the greatest code of a frame before the clamp, and the largest step of a tick, unshaped."""
-    return program.extremes
 
 
 def ramp(distance: int, step: int) -> int:

@@ -65,14 +65,8 @@ def of_segments(table: Ints, segment: Ints, fraction: Ints) -> Ints:
     Ints
         Samples, of that shape.
     """
-    b0, b1, b2, b3 = coefficients([np.roll(table, -ahead) for ahead in range(WORDS_BEHIND + 1)])
-    sample = b3[segment]
-    for lower in (b2, b1, b0):
-        sample *= fraction
-        sample += 1 << SPLINE_FRACTION_BITS
-        sample >>= SPLINE_FRACTION_BITS + 1
-        sample += lower[segment]
-    return sample
+    of_table = coefficients([np.roll(table, -ahead) for ahead in range(WORDS_BEHIND + 1)])
+    return _horner([one[segment] for one in of_table], fraction)
 
 
 def evaluate_segment(words: Sequence[Ints], fraction: Ints) -> Ints:
@@ -95,7 +89,11 @@ def evaluate_segment(words: Sequence[Ints], fraction: Ints) -> Ints:
     Ints
         Samples, 12 times the spline, of the same shape.
     """
-    b0, b1, b2, b3 = coefficients(words)
+    return _horner(coefficients(words), fraction)
+
+
+def _horner(by_power: Sequence[Ints], fraction: Ints) -> Ints:
+    b0, b1, b2, b3 = by_power
     sample = b3
     for lower in (b2, b1, b0):
         sample = lower + shift_round(sample * fraction, SPLINE_FRACTION_BITS + 1)

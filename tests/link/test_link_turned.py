@@ -8,7 +8,6 @@ from editing import run
 from replacing import replace
 from turned_scans import write_turned
 
-from tablegen.fixedpoint.frame_program import frame_extremes
 from tablegen.link.acceptance import first_objection
 from tablegen.link.messages import AxisLimits, More, Reason, Request
 from tablegen.link.prepare import PreparedScan
@@ -51,7 +50,7 @@ def test_an_image_has_the_parts_of_both_axes(scan: PreparedScan) -> None:
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_the_range_and_the_step_of_its_certificate_pass_and_no_less(scan: PreparedScan, axis: str) -> None:
     program = getattr(scan.program, axis)
-    least, most, steepest = frame_extremes(program)
+    least, most, steepest = program.extremes
     fits = {"code_min": least, "code_max": most, "max_step": steepest, "park_code": most}
     everything = AxisLimits(0, (1 << program.output.dac_bits) - 1, 1 << 24, 1 << 24)
 

@@ -14,7 +14,7 @@ from turned_scans import OPERATORS, turned_setup, write_turned
 from tablegen.base.input_errors import Rejected
 from tablegen.certificate.turned_errors import certify_turned
 from tablegen.config.load import load
-from tablegen.fixedpoint.frame_program import RATIO_FRACTION_BITS, frame_extremes, played_extremes
+from tablegen.fixedpoint.frame_program import RATIO_FRACTION_BITS, played_extremes
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import make_plan
 from tablegen.planning.turned_plan import FrameGeometry, TurnedPlan, make_turned_plan
@@ -175,7 +175,7 @@ def test_a_slew_rate_that_is_too_low_says_which_rate_fits(tmp_path: Path) -> Non
 def test_the_slew_guard_does_not_act(tmp_path: Path) -> None:
     plan = planned(tmp_path, 30.0, "- amplifier.max_slew_v_per_s")
     for axis in plan.axes:
-        least, most, steepest = frame_extremes(axis.program)
+        least, most, steepest = axis.program.extremes
         output = axis.program.output
         assert output.code_min <= least < most <= output.code_max
         assert steepest * 2 == output.max_step
