@@ -78,7 +78,8 @@ def at_angle(angle_deg: float) -> None:
         straight = PreparedScan.of_plan(make_plan(load(write_turned(Path(folder), 0.0))))
         info = info_for(straight)
         steps = {f"{axis}_limits": replace(getattr(info, f"{axis}_limits"), max_step=1 << 16) for axis in "xy"}
-        slow = {"more": More.SLOW_PARTS, "slow_knots": 17, "slow_index_bits": 6, "degree": SPLINE_DEGREE}
+        more = More.SLOW_PARTS | More.MOVE | More.SLOW_MOVE
+        slow = {"more": more, "slow_knots": 17, "slow_index_bits": 6, "degree": SPLINE_DEGREE}
         print(f"\n{len(MOVES_NM)} moves at {_BAUD} baud, {_WAY_S * 1e3:g} ms each way; medians")
         moved(write_turned(Path(folder), angle_deg), replace(info, **slow, **steps))  # type: ignore[arg-type]
 

@@ -43,13 +43,30 @@ static bool good_slow_memory(const dac_link_slow *slow)
     return slow->second != NULL && slow->table != NULL && slow->gains != NULL && slow->ratios != NULL;
 }
 
+/* Whether there is memory for the gains of two moves on both axes, or none. */
+static bool good_moved_gains(const dac_link_config *c)
+{
+#if DAC_LINK_MOVES_SLOW
+    const int32_t *const of[] = {c->x.moved_gains[0], c->x.moved_gains[1], c->y.moved_gains[0], c->y.moved_gains[1]};
+
+    for (unsigned i = 0; i < 4; i++)
+        for (unsigned j = 0; j < i; j++)
+            if ((of[i] == NULL) != (of[j] == NULL) || (of[i] != NULL && of[i] == of[j]))
+                return false;
+#else
+    (void)c;
+#endif
+    return true;
+}
+
 static bool good_slow(const dac_link_config *c)
 {
     return c->slow_knots == 0
         || (c->slow_knots >= 2 && c->slow_knots <= 65 && c->slow_index_bits >= 3 && c->slow_index_bits <= 14
             && good_slow_memory(&c->x.slow[0]) && good_slow_memory(&c->x.slow[1])
             && good_slow_memory(&c->y.slow[0]) && good_slow_memory(&c->y.slow[1])
-            && c->x.mixed != NULL && c->y.mixed != NULL && c->x.mixed != c->y.mixed);
+            && c->x.mixed != NULL && c->y.mixed != NULL && c->x.mixed != c->y.mixed
+            && good_moved_gains(c));
 }
 #endif
 
@@ -183,8 +200,9 @@ static bool in(request_set set, uint8_t request)
 }
 
 /* Bytes of a payload without tag, but for those whose length varies. */
-static uint8_t plain_bytes(uint8_t request, uint8_t length)
+static uint8_t plain_bytes(const dac_link_config *config, uint8_t request, uint8_t length)
 {
+    (void)config; /* of use for a MOVE alone */
     switch (request) {
     case DAC_LINK_HELLO:
         return 1;
@@ -213,7 +231,7 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
 #endif
 #if DAC_MOVE
     case DAC_LINK_MOVE:
-        return DAC_LINK_MOVE_BYTES;
+        return dac_link_move_bytes(config, length);
 #endif
 #if DAC_LIBRARY > 1
     case DAC_LINK_LIST:
@@ -228,7 +246,7 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
 
 static dac_link_finding check_payload(const dac_link *l, uint8_t request, const uint8_t *payload, uint8_t length)
 {
-    const uint8_t plain = plain_bytes(request, length);
+    const uint8_t plain = plain_bytes(l->config, request, length);
     const bool may_be_tagged = l->config->key_bytes != 0 && in(TAGGED, request);
     bool good = length == plain || (may_be_tagged && length == plain + DAC_LINK_TAG);
 
@@ -259,7 +277,7 @@ static dac_link_finding check_payload(const dac_link *l, uint8_t request, const 
  * wrong. */
 static bool good_tag(dac_link *l, const uint8_t *frame, uint8_t length)
 {
-    const uint8_t bytes = (uint8_t)(DAC_LINK_HEADER + plain_bytes(frame[0], length));
+    const uint8_t bytes = (uint8_t)(DAC_LINK_HEADER + plain_bytes(l->config, frame[0], length));
     const bool challenged = l->challenged;
 
     l->challenged = false;
@@ -336,7 +354,7 @@ static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payloa
 #endif
 #if DAC_MOVE
     case DAC_LINK_MOVE:
-        return dac_link_move(l, payload, a);
+        return dac_link_move(l, payload, length, a);
 #endif
 #if DAC_LIBRARY > 1
     case DAC_LINK_LIST:

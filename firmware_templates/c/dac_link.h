@@ -54,6 +54,7 @@ typedef struct {
 #else
 #define DAC_LINK_PARTS 1
 #endif
+#define DAC_LINK_MOVES_SLOW (DAC_MOVE && DAC_SLOW_PART)
 #define DAC_LINK_Y_PARTS (DAC_LINK_PARTS + DAC_PIXEL_TABLE) /* those of y, then a table of pixels */
 
 /* The resources of an axis. */
@@ -68,6 +69,9 @@ typedef struct {
 #if DAC_SLOW_PART
     dac_link_slow slow[2]; /* as the tables; unused without slow_knots */
     dac_word *mixed;       /* `room` words for the line that plays, of this axis alone */
+#endif
+#if DAC_LINK_MOVES_SLOW
+    int32_t *moved_gains[2]; /* slow_knots words each, for MOVE; all NULL: programs with slow parts are not moved */
 #endif
 } dac_link_axis;
 
@@ -206,7 +210,7 @@ typedef struct DAC_LINK_STRUCT {
     dac_link_place place;
     dac_link_part x_part[DAC_LINK_PARTS], y_part[DAC_LINK_Y_PARTS];
 #if DAC_SLOW_PART
-    dac_slow_part slow[2][2]; /* of both images: those of x and y */
+    dac_slow_part slow[DAC_MOVE ? 4 : 2][2]; /* of both images, then of two moves: those of x and y */
 #endif
     dac_link_image image[DAC_MOVE ? 3 : 2]; /* the third is that of a MOVE, with the tables that play */
 
@@ -230,6 +234,7 @@ typedef struct DAC_LINK_STRUCT {
 
 #if DAC_MOVE
     bool moving, moved;    /* a MOVE is checked or waits; the program that plays was moved */
+    uint8_t moved_slow;    /* which of the two moved slow parts was taken last; the next MOVE has the other one */
     uint8_t upload_before; /* `upload` without the MOVE */
 #endif
 

@@ -14,6 +14,12 @@ enum {
     RANGE, SLEW, JUMP
 };
 
+#if DAC_SLOW_PART
+#define MOVED_WORDS SLOW_WORD /* the only check of words that a MOVE needs */
+#else
+#define MOVED_WORDS RANGE
+#endif
+
 #define OUTSIDE 1 /* codes: ticks need not visit a word, and rounding may carry it over a limit that no tick crosses */
 
 /* From a word to its code. */
@@ -406,9 +412,9 @@ static dac_link_finding check_slow_words(dac_link *l, unsigned axis, bool *done)
     *done = true;
     if (dac_link_slow_word(l, image, axis) == 0)
         return nothing;
-    const dac_slow_part *const slow = &l->slow[l->idle][axis];
+    const dac_slow_part *const slow = &l->slow[dac_link_slow_at(l)][axis];
     const uint32_t words = UINT32_C(1) << slow->index_bits, before = 2 * dac_link_table_words(image, axis);
-    dac_word *const table = dac_link_axis_of(l, axis)->slow[l->idle].table;
+    dac_word *const table = dac_link_axis_of(l, axis)->slow[dac_link_tables(l)].table;
     dac_link_program_of(l, &program);
     const dac_axis_program *const p = axis == 0 ? &program.x : &program.y;
     const int64_t reach = INT64_C(2) << (p->dac_bits + p->gain_q); /* as that of an offset word */
@@ -423,7 +429,7 @@ static dac_link_finding check_slow_words(dac_link *l, unsigned axis, bool *done)
         }
     }
     *done = c->at == words + slow->gain_knots;
-    if (*done) /* the sequencer reads three words behind the last, of any slow table */
+    if (*done && dac_link_tables(l) == l->idle) /* the sequencer reads three words behind the last of a slow table */
         for (unsigned i = 0; i < 3; i++)
             table[words + i] = table[i];
     return nothing;
@@ -860,8 +866,8 @@ dac_link_finding dac_link_check_work(dac_link *l, bool *passed)
         c->axis = 0;
         c->stage++;
 #if DAC_MOVE
-        if (l->moving && c->stage == FOURIER) /* its tables have been rendered and checked */
-            c->stage = RANGE;
+        if (l->moving && c->stage > PROGRAM && c->stage < RANGE) /* its tables have been rendered and checked */
+            c->stage = c->stage <= MOVED_WORDS ? MOVED_WORDS : RANGE;
 #endif
     }
     c->at = 0;

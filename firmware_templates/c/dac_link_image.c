@@ -39,12 +39,6 @@ uint32_t dac_link_table_words(const dac_link_image *image, unsigned axis)
     return dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_PERIOD);
 }
 
-static int64_t offset_word(const dac_link_image *image, unsigned axis)
-{
-    return (int64_t)(int32_t)dac_link_program_word(image, axis + 1, DAC_LINK_OFFSET_HIGH) * (INT64_C(1) << 18)
-         + dac_link_program_word(image, axis + 1, DAC_LINK_OFFSET_LOW);
-}
-
 static dac_link_part table_of(const dac_link_image *image, unsigned axis)
 {
     const uint8_t bytes = (uint8_t)word_bytes(dac_link_shape(image, axis)[1]);
@@ -101,7 +95,7 @@ static void place_slow(dac_link *l, unsigned axis)
     s->gain_knots = s->ratio_knots = (uint8_t)(slow & 127u);
     s->index_bits = (uint8_t)(slow >> 8 & 15u);
     s->gain_word = (int32_t)dac_link_program_word(image, axis + 1, DAC_LINK_GAIN);
-    s->offset_word = offset_word(image, axis);
+    s->offset_word = dac_link_offset_word(image, axis);
 }
 #endif
 
@@ -254,6 +248,18 @@ static int32_t word_at(const dac_link_axis *axis, unsigned image, unsigned part,
     return axis->table[image][at];
 }
 
+/* A word of a part of the program that plays. */
+static int32_t playing_word(const dac_link *l, unsigned part, uint32_t at)
+{
+    const unsigned axis = axis_at(part);
+
+#if DAC_LINK_MOVES_SLOW
+    if (l->moved && (part - 1) % DAC_LINK_PARTS == GAINS)
+        return l->slow[DAC_LINK_MOVED_SLOW + l->moved_slow][axis].gains[at];
+#endif
+    return word_at(dac_link_axis_of(l, axis), l->playing, part, at);
+}
+
 dac_link_finding dac_link_store(dac_link *l, uint8_t byte)
 {
     dac_link_place *const at = &l->place;
@@ -363,7 +369,7 @@ uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, u
         else
 #endif
         if (at.part != 0)
-            word = (uint32_t)word_at(dac_link_axis_of(l, axis_at(at.part)), l->playing, at.part, at.word);
+            word = (uint32_t)playing_word(l, at.part, at.word);
         else if (at.word >= 64 && at.word % 64 / 4 == DAC_LINK_ORDER)
             word = 0; /* the active program plays a table, even if Fourier words were sent */
         else
@@ -406,7 +412,7 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
         a->phase_period = dac_link_program_word(image, page, DAC_LINK_PHASE_PERIOD);
         a->hold_ticks = held ? s->line_ticks : 1;
         a->gain_word = (int32_t)dac_link_program_word(image, page, DAC_LINK_GAIN);
-        a->offset_word = offset_word(image, axis);
+        a->offset_word = dac_link_offset_word(image, axis);
         a->gain_q = (uint8_t)(16u + shape[1] + guard - shape[2]);
         a->code_min = (int32_t)dac_link_program_word(image, page, DAC_LINK_CODE_MIN);
         a->code_max = (int32_t)dac_link_program_word(image, page, DAC_LINK_CODE_MAX);
@@ -421,7 +427,7 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
         a->shaping_zero = (uint8_t)(dac_link_program_word(image, page, DAC_LINK_SHAPING_WORD) >> 8);
 #endif
 #if DAC_SLOW_PART
-        a->slow = dac_link_slow_word(l, image, axis) != 0 ? &l->slow[l->idle][axis] : NULL;
+        a->slow = dac_link_slow_word(l, image, axis) != 0 ? &l->slow[dac_link_slow_at(l)][axis] : NULL;
 #endif
     }
 }

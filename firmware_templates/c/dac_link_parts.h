@@ -153,6 +153,20 @@ static inline unsigned dac_link_index_bits(const dac_link_image *image, unsigned
     return dac_link_shape(image, axis)[0] & (DAC_SPLINE ? DAC_CUBIC - 1u : 255u);
 }
 
+#if DAC_SLOW_PART
+enum { DAC_LINK_MOVED_SLOW = 2 }; /* where the slow parts of moves begin */
+
+/* Where the slow parts are of the image that is received or checked. */
+static inline unsigned dac_link_slow_at(const dac_link *l)
+{
+#if DAC_MOVE
+    return l->moving ? DAC_LINK_MOVED_SLOW + 1u - l->moved_slow : l->idle;
+#else
+    return l->idle;
+#endif
+}
+#endif
+
 #if DAC_PIXEL_TABLE
 /* The word that says whether an image has a table of pixels; 0 on a device that has no memory for one. */
 static inline uint32_t dac_link_pixel_word(const dac_link *l, const dac_link_image *image)
@@ -172,6 +186,13 @@ static inline uint32_t dac_link_slow_word(const dac_link *l, const dac_link_imag
     (void)axis;
     return 0;
 #endif
+}
+
+/* The offset word of an axis, from its two words. */
+static inline int64_t dac_link_offset_word(const dac_link_image *image, unsigned axis)
+{
+    return (int64_t)(int32_t)dac_link_program_word(image, axis + 1, DAC_LINK_OFFSET_HIGH) * (INT64_C(1) << 18)
+         + dac_link_program_word(image, axis + 1, DAC_LINK_OFFSET_LOW);
 }
 
 /* dac_link_answer.c */
@@ -290,8 +311,30 @@ uint8_t dac_link_put_z_status(const dac_link *l, uint8_t *at);
 
 #if DAC_MOVE
 /* dac_link_move.c */
-#define DAC_LINK_MOVE_BYTES 28 /* generation; gain, offset low and high of x, then of y */
-dac_link_finding dac_link_move(dac_link *l, const uint8_t *payload, dac_link_answer *a);
+#define DAC_LINK_MOVE_BYTES 28   /* generation; gain, offset low and high of x, then of y */
+#define DAC_LINK_FACTOR_BYTES 8 /* behind them, for slow parts: factor of the gains of x, then of y */
+
+/* Whether a link moves programs with slow parts. */
+static inline bool dac_link_moves_slow(const dac_link_config *config)
+{
+#if DAC_LINK_MOVES_SLOW
+    return config->slow_knots != 0 && config->x.moved_gains[0] != NULL;
+#else
+    (void)config;
+    return false;
+#endif
+}
+
+/* Bytes of the payload of a MOVE without its tag. */
+static inline uint8_t dac_link_move_bytes(const dac_link_config *config, uint8_t length)
+{
+    const uint8_t most = DAC_LINK_MOVE_BYTES + DAC_LINK_FACTOR_BYTES;
+
+    return dac_link_moves_slow(config) && (length == most || length == most + DAC_LINK_TAG) ? most
+                                                                                          : DAC_LINK_MOVE_BYTES;
+}
+
+dac_link_finding dac_link_move(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
 
 /* The sequencer plays the moved program. */
 void dac_link_take_move(dac_link *l);

@@ -21,12 +21,16 @@ enum { PLAYS_PIXEL_TABLES = 4 };
 enum { HAS_Z = 16, Z_AT = 8, Z_BYTES = 48 };
 #endif
 /* Further features, by the options; HELLO ends with them if there are any. */
-#define TAKES_MOVE (DAC_MOVE ? 2u : 0u)
+#if DAC_MOVE
+#define TAKES_MOVE(l) (2u | (dac_link_moves_slow((l)->config) ? 32u : 0u))
+#else
+#define TAKES_MOVE(l) 0u
+#endif
 #if DAC_LIBRARY > 1
 enum { PLAYS_NUMBERS = 8 };
-#define FURTHER(l) (TAKES_MOVE | (dac_link_numbers(l) != 0 ? (uint32_t)PLAYS_NUMBERS : 0u))
+#define FURTHER(l) (TAKES_MOVE(l) | (dac_link_numbers(l) != 0 ? (uint32_t)PLAYS_NUMBERS : 0u))
 #else
-#define FURTHER(l) TAKES_MOVE
+#define FURTHER(l) TAKES_MOVE(l)
 #endif
 #if DAC_MOVE
 enum { MOVED = 2 }; /* behind PERMITS */

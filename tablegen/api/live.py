@@ -21,7 +21,7 @@ from tablegen.config.image_keys import IMAGES, SIZES
 from tablegen.config.load import Setup
 from tablegen.config.variants import Variant, other_settings, variants
 from tablegen.device.commit_mode import CommitMode
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import DualProgram, ScanProgram
 from tablegen.device.schedule import Schedule
 from tablegen.device.sequencer import can_keep
 from tablegen.link.device import Device
@@ -154,7 +154,7 @@ class _Playing:
     def of_upload(cls, scan: _Scan, generation: int) -> "_Playing":
         """Return the state after an upload."""
         program = scan.plan.program
-        return cls(scan, (words_of(program.x.output), words_of(program.y.output)), generation)
+        return cls(scan, (words_of(program.x), words_of(program.y)), generation)
 
 
 class Live:
@@ -217,6 +217,7 @@ class Live:
         self._on_preview = on_preview
         self._playing: _Playing | None = None
         self._previewed: _Playing | None = None  # what plays if the device has taken the last MOVE
+        self._before_move: _Playing | None = None  # what played before a MOVE at an angle
 
     @property
     def plan(self) -> AnyPlan:
@@ -357,7 +358,8 @@ class Live:
     def _preview_at_angle(self, setup: Setup) -> LivePreview | None:
         """Play the tables of a scan at an angle with other gains and offsets, before the plan of a change is there.
 
-        A MOVE cannot say them: they go as a program. None where the device or a limit does not take them.
+        They go as a MOVE, or as a program where the device does not take that. None where neither it nor a limit takes
+        them.
         """
         before, device = self.plan, self._device
         if not (self._is_sent and isinstance(before, TurnedPlan) and setup.mixes_motions):
@@ -365,7 +367,38 @@ class Live:
         if Feature.COMMIT_MODES not in device.info.features:  # it would restart the frame
             return None
         preview = turned_preview(setup, before)
-        if preview is None or not self._is_accepted(preview, before):
+        if preview is None:
+            return None
+        generation = self._move_at_angle(preview, before)
+        if generation is None:
+            generation = self._upload_at_angle(preview, before)
+        if generation is None:
+            return None
+        live_preview = LivePreview(generation, preview.x_error_percent, preview.y_error_percent)
+        if self._on_preview is not None:
+            self._on_preview(live_preview)
+        return live_preview
+
+    def _move_at_angle(self, preview: TurnedPreview, before: TurnedPlan) -> int | None:
+        """Play a preview by a MOVE; return its generation, None where the device does not take it."""
+        device, playing, self._before_move = self._device, self._playing, None
+        if playing is None or More.SLOW_MOVE not in device.info.more or before.tilts:
+            return None
+        x, y = (move.program(axis.program) for move, axis in zip(preview.moves, before.axes, strict=True))
+        if not is_accepted(ScanProgram(x, y, before.schedule), self._limits, before.program, device.info.shaping):
+            return None
+        words = tuple(AxisWords(move.gain_word, move.offset_word, move.factor_word) for move in preview.moves)
+        try:
+            generation = device.move(words[0], words[1], playing.generation).generation
+        except Refused:
+            return None
+        self._before_move, self._playing = playing, replace(playing, words=(words[0], words[1]), generation=generation)
+        return generation
+
+    def _upload_at_angle(self, preview: TurnedPreview, before: TurnedPlan) -> int | None:
+        """Play a preview by an upload; return its generation, None where the device does not take it."""
+        device = self._device
+        if not self._is_accepted(preview, before):
             return None
         digest = program_digest(preview.program, preview.program_of_z)
         scan = PreparedScan(before.name, digest, preview.program, None, None, preview.program_of_z)
@@ -375,10 +408,7 @@ class Live:
             result = device.upload(image, limits=self._limits, swap=CommitMode.KEEP)
         except (Refused, Unsuitable):
             return None
-        live_preview = LivePreview(result.generation, preview.x_error_percent, preview.y_error_percent)
-        if self._on_preview is not None:
-            self._on_preview(live_preview)
-        return live_preview
+        return result.generation
 
     def _is_accepted(self, preview: TurnedPreview, before: TurnedPlan) -> bool:
         """Return True if the device accepts the programs of a preview behind those of a plan, by both sequencers."""
@@ -391,6 +421,9 @@ class Live:
 
     def _go_back(self) -> None:
         """Play the scan before a preview whose plan was refused; a lost link leaves the preview."""
+        if self._before_move is not None:
+            self._move_back(self._before_move)
+            return
         with suppress(LinkError):
             image = self._scan.prepared.image("auto", self._device.info)
             result = self._device.upload(image, limits=self._limits, swap=CommitMode.KEEP)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from tablegen.device.dual_program import DualProgram, ScanProgram
-from tablegen.fixedpoint.output import Output
+from tablegen.device.dual_program import AxisProgram, DualProgram, ScanProgram
+from tablegen.fixedpoint.frame_program import FACTOR_FRACTION_BITS, FrameProgram
 from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.messages import AxisWords
@@ -46,9 +46,11 @@ class PreviewWords:
         return DualProgram(_moved(playing.x, self.x), _moved(playing.y, self.y), playing.schedule)
 
 
-def words_of(output: Output) -> AxisWords:
+def words_of(axis: AxisProgram) -> AxisWords:
     """Return the words of a program that was not moved."""
-    return AxisWords(output.gain_word, output.offset_word)
+    if isinstance(axis, FrameProgram):
+        return AxisWords(axis.slow.gain_word, axis.slow.offset_word, 1 << FACTOR_FRACTION_BITS)
+    return AxisWords(axis.output.gain_word, axis.output.offset_word)
 
 
 def preview_words(playing: DualProgram, plan: DualProgram) -> PreviewWords | None:

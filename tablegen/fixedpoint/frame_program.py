@@ -32,6 +32,7 @@ SECOND_BITS = 8
 SLOW_BITS = 43  # of an offset word
 SUM_BITS = 44  # of product and offset before the rounding
 MOST_KNOTS = 65
+FACTOR_FRACTION_BITS = 16  # of a factor of all gains, which has 32 bits
 
 
 class Knots(Struct, frozen=True, eq=False):
@@ -52,6 +53,11 @@ class Knots(Struct, frozen=True, eq=False):
     def lines(self) -> int:
         """The lines that the knots reach."""
         return (len(self.words) - 1) * self.spacing
+
+    def times(self, factor_word: int) -> "Knots":
+        """Return the knots times ``factor_word / 2^16``, to the nearest whole number, ties up: a move of a program."""
+        half = 1 << (FACTOR_FRACTION_BITS - 1)
+        return Knots((self.words * factor_word + half) >> FACTOR_FRACTION_BITS, self.spacing)
 
     def at(self, line: Ints) -> Ints:
         """Return the nearest whole numbers to the straight lines between the knots, ties up; a knot is met exactly.

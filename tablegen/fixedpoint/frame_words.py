@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from tablegen.base.input_errors import Unphysical
 from tablegen.fixedpoint.converter import fit_gain, scaled_output
 from tablegen.fixedpoint.frame_program import (
+    FACTOR_FRACTION_BITS,
     RATIO_BITS,
     RATIO_FRACTION_BITS,
     SECOND_BITS,
@@ -114,25 +115,43 @@ def _length(series: FourierSeries) -> int:
     return max(_LEAST_LENGTH, 1 << (4 * series.harmonics - 1).bit_length())
 
 
-def scaled_frame(program: FrameProgram, fast: float, slow: float, offset: float) -> FrameProgram:
-    """Return a program with the same tables, its parts of line and frame scaled, about an offset.
+class FrameMove(Struct, frozen=True):
+    """The words that move a program with a slow part: a factor of its gains, gain and offset of the slow table.
 
-    Parameters
-    ----------
-    fast, slow
-        Factors of the gains of the line and of the gain of the frame.
-    offset
-        Code of the slow part at 0, as a real number.
-
-    Raises
-    ------
-    OverflowError
-        If a word does not fit.
+    A device makes them of a MOVE, or plays them in a program that was uploaded.
     """
-    gains = np.rint(fast * program.gains.words).astype(np.int64)
-    word = round_number(offset * float(1 << program.output.gain_q))
-    slow_table = SlowTable(program.slow.words, round_number(slow * program.slow.gain_word), word)
-    return replace(program, gains=Knots(gains, program.gains.spacing), slow=slow_table)
+
+    factor_word: int
+    gain_word: int
+    offset_word: int
+
+    @classmethod
+    def of(cls, program: FrameProgram, fast: float, slow: float, offset: float) -> "FrameMove":
+        """Return the words that scale the parts of line and frame of a program, about an offset.
+
+        Parameters
+        ----------
+        fast, slow
+            Factors of the gains of the line and of the gain of the frame.
+        offset
+            Code of the slow part at 0, as a real number.
+        """
+        return cls(
+            factor_word=round_number(fast * float(1 << FACTOR_FRACTION_BITS)),
+            gain_word=round_number(slow * program.slow.gain_word),
+            offset_word=round_number(offset * float(1 << program.output.gain_q)),
+        )
+
+    def program(self, before: FrameProgram) -> FrameProgram:
+        """Return the program with the same tables and these words.
+
+        Raises
+        ------
+        OverflowError
+            If a word does not fit.
+        """
+        table = SlowTable(before.slow.words, self.gain_word, self.offset_word)
+        return replace(before, gains=before.gains.times(self.factor_word), slow=table)
 
 
 def _spline(series: FourierSeries, length: int) -> FourierSeries:

@@ -287,7 +287,8 @@ class Device:
         Parameters
         ----------
         x, y
-            The words of both axes, with the fraction bits of the program.
+            The words of both axes, with the fraction bits of the program. With a ``factor_word`` those of a program
+            with slow parts, with its gains as it was uploaded times ``factor_word / 2^16``.
         generation
             That of the program, as ``UploadResult``, ``MoveResult`` or the status has it.
         timeout_s
@@ -296,13 +297,13 @@ class Device:
         Raises
         ------
         Unsuitable
-            If the device takes no moves (``More.MOVE``); nothing was sent.
+            If the device takes no moves (``More.MOVE``), or none of slow parts; nothing was sent.
         Refused
             If another program plays, or the moved one would break a limit; the device plays as before.
         LinkLost
             If the device is gone; the scan plays as before, or moved.
         """
-        if why := lacks_move(self.info):
+        if why := lacks_move(self.info, x.factor_word is not None):
             raise Unsuitable([why])
         payload, tries = Move(generation, x, y).pack(), _MAX_TRIES + math.ceil(timeout_s)
         session = self._session

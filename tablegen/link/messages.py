@@ -107,6 +107,7 @@ class More(IntFlag):
     PIXEL_TABLES = 4
     PLAY = 8
     Z = 16
+    SLOW_MOVE = 32
 
 
 NO_MORE = More(0)
@@ -671,20 +672,25 @@ class Play(_Struct):
 
 @dataclass(frozen=True, slots=True)
 class AxisWords:
-    """The words of an axis that MOVE replaces: the gain, and the offset with the fraction bits of the program."""
+    """The words of an axis that MOVE replaces: the gain, and the offset with the fraction bits of the program.
+
+    With a slow part they are those of the slow table, and ``factor_word`` is that of the gains of the line.
+    """
 
     gain_word: int
     offset_word: int
+    factor_word: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
     """The payload of MOVE (28 bytes): new gain and offset words of the program ``generation``, whose tables stay.
 
-    Those of an axis are as words 3 to 5 of its page.
+    Those of an axis are as words 3 to 5 of its page. For a program with slow parts the factors of both axes follow.
     """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<IiIiiIi")
+    FACTORS: ClassVar[struct.Struct] = struct.Struct("<2i")
     LOW_BITS: ClassVar[int] = 18  # of an offset, as in tablegen.device.registers, which imports numpy
 
     generation: int
@@ -699,7 +705,10 @@ class Move:
             for axis in (self.x, self.y)
             for word in (axis.gain_word, axis.offset_word & mask, axis.offset_word >> self.LOW_BITS)
         ]
-        return self.LAYOUT.pack(self.generation, *words)
+        data = self.LAYOUT.pack(self.generation, *words)
+        if self.x.factor_word is None or self.y.factor_word is None:
+            return data
+        return data + self.FACTORS.pack(self.x.factor_word, self.y.factor_word)
 
 
 @dataclass(frozen=True, slots=True)

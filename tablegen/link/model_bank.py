@@ -17,28 +17,49 @@ from tablegen.device.registers import (
     SLOW_WORDS,
 )
 from tablegen.device.schedule import Schedule, Window
+from tablegen.fixedpoint.frame_program import Knots
+from tablegen.fixedpoint.output import GAIN_BITS
+from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.messages import (
     HASH_BYTES,
     OF_Z,
     SPLINE_DEGREE,
+    TAG_BYTES,
     AxisLimits,
     AxisShape,
     DeviceInfo,
     DeviceState,
     ImageInfo,
     More,
+    Move,
     Reason,
     Upload,
 )
 from tablegen.link.players import Player
-from tablegen.link.program_image import PROGRAM_BYTES, Contents, ProgramImage, make_image, size_of, take_apart
+from tablegen.link.program_image import (
+    PROGRAM_BYTES,
+    Contents,
+    ProgramImage,
+    make_image,
+    pack_words,
+    parts_of,
+    size_of,
+    take_apart,
+)
 
 _MIN_INDEX_BITS = 3  # least index bits of an interpolated table, and of a slow one
 _MIXED_INDEX_BITS = 8  # most index bits of a table of lines with a slow part
 _MIN_KNOTS = 2
 _SCHEDULE_BYTES = 4 * (SCAN_WORDS.index("pixels") + 1)  # program words that the images of x and y and of z share
 _MOVED_BYTES = 12  # words of an axis that MOVE replaces: the gain, and the low and the high part of the offset
+
+
+def plain_move_bytes(size: int) -> int:
+    """Return the bytes of the payload of a MOVE without its tag; with factors they are more."""
+    plain = Move.LAYOUT.size
+    with_factors = plain + Move.FACTORS.size
+    return with_factors if size in (with_factors, with_factors + TAG_BYTES) else plain
 
 
 class RequestRefused(Exception):
@@ -67,14 +88,19 @@ class IncomingUpload:
 class ActiveUpload:
     """An upload that plays: the generation since which it does, and the last line of the old program.
 
-    ``moved``: MOVE has changed its words since it was uploaded.
+    ``moved``: the image as it was uploaded, if MOVE has changed its words since.
     """
 
     info: ImageInfo
     image: bytes
     generation: int
     line: int
-    moved: bool = False
+    moved: bytes | None = None
+
+    @property
+    def uploaded(self) -> bytes:
+        """The image as it was uploaded."""
+        return self.image if self.moved is None else self.moved
 
 
 def program_of(contents: Contents, update_rate_hz: int = 0) -> ScanProgram:
@@ -248,7 +274,7 @@ class Bank:
         if self.move is not None:
             raise RequestRefused(Reason.BUSY)
         if incoming is None:
-            if active is None or active.moved or active.info.image_crc != image_crc:
+            if active is None or active.moved is not None or active.info.image_crc != image_crc:
                 raise RequestRefused(Reason.UPLOAD)
             return active
         if incoming.info.image_crc != image_crc:
@@ -302,10 +328,11 @@ class Bank:
 
     def take(self, incoming: IncomingUpload) -> None:
         """Make an upload, or a move, the current one, once the sequencer has taken its program."""
-        moved = incoming is self.move
+        is_moved = incoming is self.move
+        uploaded = self.active.uploaded if is_moved and self.active is not None else None
         generation, line = self._player.swaps, self._player.swapped_at
-        self.active = ActiveUpload(incoming.info, bytes(incoming.data), generation, line, moved)
-        if moved:
+        self.active = ActiveUpload(incoming.info, bytes(incoming.data), generation, line, uploaded)
+        if is_moved:
             self.move = None
             return
         self.incoming = None
@@ -326,18 +353,45 @@ class Bank:
         if generation != self._player.swaps:
             raise RequestRefused(Reason.GENERATION, self._player.swaps)
         playing = struct.unpack_from(f"<{PROGRAM_BYTES // 4}I", active.image)
+        has_factors = plain_move_bytes(len(payload)) > Move.LAYOUT.size
         for axis in range(2):
-            if playing[PAGE_WORDS * (axis + 1) + len(AXIS_WORDS) + SLOW_WORDS.index("slow_part")]:
+            slow_part = playing[PAGE_WORDS * (axis + 1) + len(AXIS_WORDS) + SLOW_WORDS.index("slow_part")]
+            if (slow_part != 0) != has_factors:
                 raise RequestRefused(Reason.SLOW_PART, axis)
+        data = bytearray(active.image)
+        if has_factors:
+            self._scale_gains(data, active, Move.FACTORS.unpack_from(payload, Move.LAYOUT.size))
         if not permits:
             raise RequestRefused(Reason.INTERLOCK)
-        data = bytearray(active.image)
         for axis in range(2):
             at = 4 * (PAGE_WORDS * (axis + 1) + AXIS_WORDS.index("gain"))
             words = payload[4 + _MOVED_BYTES * axis :]
             data[at : at + _MOVED_BYTES] = words[:_MOVED_BYTES]
         self.move = IncomingUpload(replace(active.info, hash=bytes(HASH_BYTES)), b"", data, Upload.CHECKING)
         return self.move
+
+    def _scale_gains(self, data: bytearray, active: ActiveUpload, factors: tuple[int, ...]) -> None:
+        """Put the gains that were uploaded, times the factor of each axis, into an image.
+
+        Raises
+        ------
+        RequestRefused
+            If one has more than its 18 bits.
+        """
+        info, at, (low, high) = active.info, PROGRAM_BYTES, signed_limits(GAIN_BITS)
+        contents = take_apart(active.uploaded, info.x, info.y, self._info.more)
+        for axis, factor in enumerate(factors):
+            word = 0
+            for part in parts_of(contents.words, axis + 1, contents.shape(axis + 1), self._info.more):
+                slow = contents.slow(axis + 1)
+                if part.name == "gain" and slow is not None:
+                    gains = Knots(slow.gains, 1).times(factor).words
+                    for knot, gain in enumerate(gains.tolist()):
+                        if not low <= gain <= high:
+                            raise RequestRefused(Reason.WORD, axis + 2 * (word + knot))
+                    data[at : at + part.length * part.size] = pack_words(gains, part.size)
+                word += part.length
+                at += part.length * part.size
 
     def at_work(self) -> IncomingUpload | None:
         """Return the upload or the move that is checked or waits."""

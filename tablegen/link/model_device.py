@@ -34,7 +34,7 @@ from tablegen.link.messages import (
     ZImageInfo,
     ZStatus,
 )
-from tablegen.link.model_bank import ActiveUpload, Bank, IncomingUpload, RequestRefused
+from tablegen.link.model_bank import ActiveUpload, Bank, IncomingUpload, RequestRefused, plain_move_bytes
 from tablegen.link.model_store import ModelStore
 from tablegen.link.players import Player
 from tablegen.link.program_image import ProgramImage
@@ -132,8 +132,7 @@ class ModelDevice:
             raise ValueError("a key and the feature go together")
         if (flash is not None) != (Feature.STORE in info.features):
             raise ValueError("a flash and the feature go together")
-        if More.MOVE in info.more and (staged or Feature.COMMIT_MODES not in info.features):
-            raise ValueError("a device that takes MOVE keeps tables and has modes of a COMMIT")
+        _check_moves(info, staged)
         if More.PLAY in info.more and (staged or (not compiled and flash is None)):
             raise ValueError("a device that takes PLAY keeps tables and has programs")
         _check_z(info, z_player, staged)
@@ -296,7 +295,7 @@ class ModelDevice:
             state=player.state,
             upload=Upload.NONE if upload is None else upload.state,
             faults=player.faults,
-            flags=(PERMITS if self.permits else 0) | (MOVED if active is not None and active.moved else 0),
+            flags=(PERMITS if self.permits else 0) | (MOVED if active is not None and active.moved is not None else 0),
             boot=self.boot,
             generation=player.swaps,
             line=player.line,
@@ -383,6 +382,8 @@ class ModelDevice:
         sizes = {plain, plain + TAG_BYTES} if self._key and kind in _TAGGED else {plain}
         if kind == Request.COMMIT and Feature.COMMIT_MODES in self.info.features:
             return sizes | {size + 1 for size in sizes}
+        if kind == Request.MOVE and More.SLOW_MOVE in self.info.more:
+            return sizes | {size + Move.FACTORS.size for size in sizes}
         if kind == Request.BEGIN and self.info.z is not None:
             return sizes | {plain + ZImageInfo.LAYOUT.size}
         if kind == Request.LIMITS:
@@ -600,6 +601,14 @@ class ModelDevice:
         return hashlib.blake2s(count, key=self._key, digest_size=NONCE_BYTES).digest()
 
 
+def _check_moves(info: DeviceInfo, staged: bool) -> None:
+    """Raise ``ValueError`` if a device cannot take moves as it says."""
+    if More.MOVE in info.more and (staged or Feature.COMMIT_MODES not in info.features):
+        raise ValueError("a device that takes MOVE keeps tables and has modes of a COMMIT")
+    if More.SLOW_MOVE in info.more and More.MOVE | More.SLOW_PARTS not in info.more:
+        raise ValueError("a device that moves slow parts takes MOVE and plays slow parts")
+
+
 def _check_z(info: DeviceInfo, player: Player | None, staged: bool) -> None:
     """Raise ``ValueError`` if a device cannot have the output z, or not as it says."""
     if len({info.z is None, player is None, More.Z not in info.more}) != 1:
@@ -612,6 +621,8 @@ def _plain_bytes(frame: Frame) -> int:
     """Return the bytes of a payload without its tag."""
     if frame.type == Request.COMMIT and len(frame.payload) in (_COMMIT_WITH_MODE, _COMMIT_WITH_MODE + TAG_BYTES):
         return _COMMIT_WITH_MODE
+    if frame.type == Request.MOVE:
+        return plain_move_bytes(len(frame.payload))
     return _PAYLOAD_BYTES.get(frame.type, 0)
 
 

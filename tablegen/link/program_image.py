@@ -98,13 +98,13 @@ def make_image(
     data = np.array(words, dtype="<u4").tobytes()
     for axis, fourier in ((program.x, x_fourier), (program.y, y_fourier)):
         if fourier is not None:
-            data += _bytes(fourier, FOURIER_BYTES)
+            data += pack_words(fourier, FOURIER_BYTES)
             continue
         size = shape_of(axis).word_bytes
-        data += _bytes(fast_of(axis).words, size)
+        data += pack_words(fast_of(axis).words, size)
         if isinstance(axis, FrameProgram):
-            data += _bytes(axis.second, SECOND_BYTES) + _bytes(axis.slow.words, size)
-            data += _bytes(axis.gains.words, GAIN_BYTES) + _bytes(axis.ratios.words, RATIO_BYTES)
+            data += pack_words(axis.second, SECOND_BYTES) + pack_words(axis.slow.words, size)
+            data += pack_words(axis.gains.words, GAIN_BYTES) + pack_words(axis.ratios.words, RATIO_BYTES)
     for counts in program.schedule.pixel_table or ():
         data += np.array(counts, dtype="<u2").tobytes()
     shapes = shape_of(program.x), shape_of(program.y)
@@ -137,7 +137,7 @@ def shape_of(axis: AxisProgram) -> AxisShape:
     return AxisShape(index_bits, axis.bits, axis.output.dac_bits)
 
 
-def _bytes(words: Ints, size: int) -> bytes:
+def pack_words(words: Ints, size: int) -> bytes:
     """Return the low bytes of two's complement words, the lowest first."""
     return words.astype("<i8").view(np.uint8).reshape(-1, 8)[:, :size].tobytes()
 

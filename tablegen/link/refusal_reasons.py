@@ -82,11 +82,13 @@ def lacks_mode(info: DeviceInfo, swap: CommitMode) -> str | None:
     )
 
 
-def lacks_move(info: DeviceInfo) -> str | None:
-    """Return why a device does not take MOVE; None if it does."""
-    if More.MOVE in info.more:
-        return None
-    return "the device takes no MOVE: build its firmware with DAC_MOVE=1 and DAC_COMMIT_MODES=1; FPGAs take none"
+def lacks_move(info: DeviceInfo, of_slow_parts: bool = False) -> str | None:
+    """Return why a device does not take MOVE, or one of a program with slow parts; None if it does."""
+    if More.MOVE not in info.more:
+        return "the device takes no MOVE: build its firmware with DAC_MOVE=1 and DAC_COMMIT_MODES=1; FPGAs take none"
+    if of_slow_parts and More.SLOW_MOVE not in info.more:
+        return "the device moves no slow parts: give its link moved_gains of both axes"
+    return None
 
 
 def lacks_play(info: DeviceInfo) -> str | None:

@@ -14,7 +14,7 @@ from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
 from tablegen.config.load import Setup
 from tablegen.device.dual_program import ScanProgram
 from tablegen.fixedpoint.frame_program import FrameProgram
-from tablegen.fixedpoint.frame_words import scaled_frame
+from tablegen.fixedpoint.frame_words import FrameMove
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.turned_plan import (
@@ -37,10 +37,12 @@ _LEAST_SHARE = 0.02  # of the longer motion: a part that is shorter is not made 
 class TurnedPreview(Struct, frozen=True, eq=False):
     """Both axes of a preview, and their largest distances from the wanted position by the operators.
 
-    They are in percent of the longer motion of each axis. ``program_of_z`` is that of the plan behind the preview.
+    They are in percent of the longer motion of each axis. ``moves`` are the words of x and y that make the program of
+    that which plays. ``program_of_z`` is that of the plan behind the preview.
     """
 
     program: ScanProgram
+    moves: tuple[FrameMove, FrameMove]
     x_error_percent: float
     y_error_percent: float
     program_of_z: ScanProgram | None = None
@@ -65,24 +67,26 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     shares, tilts = geometry.shares, plan_tilts(setup, straight, geometry, problems)
     if problems.entries or tilts.keys() != {tilt.name for tilt in plan.tilts}:
         return None
-    programs, errors = [], []
+    programs, moves, errors = [], [], []
     for axis, line in zip(plan.axes, straight.lines, strict=True):
         try:
-            program, error = _scaled(setup, plan, straight, axis, line, *shares[axis.axis])
+            program, move, error = _scaled(setup, plan, straight, axis, line, *shares[axis.axis])
         except (Unphysical, OverflowError):
             return None
         if program is None:
             return None
         programs.append(program)
+        moves.append(move)
         errors.append(error)
     program_of_z = structs.replace(plan, **tilts).program_of_z
-    return TurnedPreview(ScanProgram(programs[0], programs[1], old), errors[0], errors[1], program_of_z)
+    both = ScanProgram(programs[0], programs[1], old)
+    return TurnedPreview(both, (moves[0], moves[1]), errors[0], errors[1], program_of_z)
 
 
 def _scaled(
     setup: Setup, plan: TurnedPlan, straight: Plan, axis: TurnedAxis, line: LinePlan, fast_nm: float, slow_nm: float
-) -> tuple[FrameProgram | None, float]:
-    """Return the program of an axis with its parts scaled, None if it leaves a limit; and its error in percent."""
+) -> tuple[FrameProgram | None, FrameMove, float]:
+    """Return the program of an axis with its parts scaled, None if it leaves a limit; its words, and its error in %."""
     motion = replace(
         axis.motion, fast_nm=fast_nm, slow_nm=slow_nm, centre=line.drive.driver.share(line.drive.v_offset), layer=None
     )
@@ -97,10 +101,10 @@ def _scaled(
             fast *= fast_nm / moved_fast if abs(moved_fast) > _LEAST_SHARE * abs(fast_nm) else 1.0
             slow *= slow_nm / moved_slow if abs(moved_slow) > _LEAST_SHARE * abs(slow_nm) else 1.0
     check_reach(axis.known, drive, motion.lines)
-    program = scaled_frame(axis.program, fast, slow, axis.converter.code(axis.known.driver.volts(centre)))
+    move = FrameMove.of(axis.program, fast, slow, axis.converter.code(axis.known.driver.volts(centre)))
     problems = Problems()
-    program = within_range(setup, straight, line, program, problems)
-    return None if problems.entries else program, 100.0 * error_nm / motion.longest_nm
+    program = within_range(setup, straight, line, move.program(axis.program), problems)
+    return None if problems.entries else program, move, 100.0 * error_nm / motion.longest_nm
 
 
 def _ratio(new_nm: float, old_nm: float, least_nm: float) -> float:

@@ -1,5 +1,6 @@
 """``tablegen live``: requests as lines of JSON, against the model of a device in virtual time."""
 
+import hashlib
 import io
 import json
 import re
@@ -259,6 +260,13 @@ def turned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DeviceInfo]:
     return file, replace(info, features=info.features | Feature.COMMIT_MODES, **slow, **steps)  # type: ignore[arg-type]
 
 
+@pytest.fixture(params=[False, True], ids=["uploads", "moves"])
+def previewed(request: pytest.FixtureRequest, turned: tuple[Path, DeviceInfo]) -> tuple[Path, DeviceInfo, bool]:
+    """The same with devices whose previews at an angle are uploads, or moves."""
+    file, info = turned
+    return file, replace(info, more=info.more | More.SLOW_MOVE) if request.param else info, request.param
+
+
 @pytest.mark.common
 def test_a_scan_is_turned(turned: tuple[Path, DeviceInfo], tmp_path: Path) -> None:
     """From 0 degrees to an angle, on to another one, moved there, and back: each is the scan that a build makes."""
@@ -326,9 +334,9 @@ def test_keys_turn_and_move_along_the_lines(turned: tuple[Path, DeviceInfo]) -> 
 
 
 @pytest.mark.common
-def test_a_preview_at_an_angle_whose_plan_is_refused_gives_way(turned: tuple[Path, DeviceInfo]) -> None:
+def test_a_preview_at_an_angle_whose_plan_is_refused_gives_way(previewed: tuple[Path, DeviceInfo, bool]) -> None:
     """By the plan, after the preview, and by the device; no frame is restarted, and the next change begins there."""
-    file, info = turned
+    file, info, moves = previewed
     watch, boot = _Watch(), make_plan(load(file)).program
     machine = ModelDevice(info, SequencerPlayer(boot, on_tick=watch))
     machine.tick(1)
@@ -339,15 +347,18 @@ def test_a_preview_at_an_angle_whose_plan_is_refused_gives_way(turned: tuple[Pat
             playing = machine.player.playing
             assert playing is not None
             assert isinstance(playing.x, FrameProgram)
-            previews.append(device.status().hash.hex())
+            status = device.status()
+            assert (status.moved, status.hash == bytes(32)) == (moves, moves)
+            previews.append(hashlib.sha256(device.readback()).hexdigest())
 
         live = Live(device, file, {"angle_deg": 20.0}, on_preview=note)
-        before = live.start()
+        before, image = live.start(), device.readback()
         watch.lines.clear()
         problem = Rejected([Problem("scan.toml", 1, "limits", "is exceeded")])
         with patch("tablegen.api.live.build_turned", side_effect=problem), pytest.raises(Rejected):
             live.move(20.0)
-        assert device.status().hash.hex() == before.digest
+        assert device.readback() == image
+        assert device.status().hash.hex() == (bytes(32).hex() if moves else before.digest)
         assert machine.player.swaps == before.generation + 2
         with pytest.raises(Rejected):
             live.move(1e6)  # of which nothing is sent
@@ -355,7 +366,7 @@ def test_a_preview_at_an_angle_whose_plan_is_refused_gives_way(turned: tuple[Pat
         after = live.move(20.0, -10.0)
         assert device.status().hash.hex() == after.digest
     assert len(set(previews)) == len(previews) == 2
-    assert before.digest not in previews
+    assert hashlib.sha256(image).hexdigest() not in previews
     assert after.x.position_nm == pytest.approx(before.x.position_nm + 20.0, abs=1e-6)
     assert (after.swap, after.generation) == ("keep", before.generation + 4)
     assert all((later - earlier) % 16 == 1 for earlier, later in pairwise(watch.lines))
@@ -728,9 +739,11 @@ def test_no_code_jumps_and_no_frame_restarts_while_it_is_moved(pairs: int, info:
 
 @pytest.mark.rest
 @pytest.mark.parametrize("rounds", [2, pytest.param(40, marks=LONG_TEST)])
-def test_no_code_jumps_and_no_frame_restarts_while_it_is_turned(rounds: int, turned: tuple[Path, DeviceInfo]) -> None:
+def test_no_code_jumps_and_no_frame_restarts_while_it_is_turned(
+    rounds: int, previewed: tuple[Path, DeviceInfo, bool]
+) -> None:
     """Random moves, zooms and turns at an angle, tick by tick, with the previews: each line is of one program."""
-    file, info = turned
+    file, info, _ = previewed
     rng, watch = np.random.default_rng(11), _Watch()
     machine = ModelDevice(info, SequencerPlayer(make_plan(load(file)).program, on_tick=watch))
     machine.tick(1)
@@ -756,7 +769,8 @@ def test_no_code_jumps_and_no_frame_restarts_while_it_is_turned(rounds: int, tur
                 if scan.preview is not None:
                     assert max(scan.preview.x_error_percent, scan.preview.y_error_percent) < 10.0
         assert device.status().faults == 0
-        assert device.status().hash.hex() == live_digest(live)
+        assert isinstance(live.plan, TurnedPlan)
+        assert device.readback() == PreparedScan.of_turned(live.plan).image("table").data
     assert all(
         step <= limits.max_step for step, limits in zip(watch.steps, (info.x_limits, info.y_limits), strict=True)
     )
@@ -766,12 +780,6 @@ def test_no_code_jumps_and_no_frame_restarts_while_it_is_turned(rounds: int, tur
     assert not watch.mixed
     assert previews > changes // 2 > refused
     assert machine.player.swaps >= first.generation + previews + changes - refused
-
-
-def live_digest(live: Live) -> str:
-    """The digest of the plan that should play."""
-    assert isinstance(live.plan, TurnedPlan)
-    return PreparedScan.of_turned(live.plan).digest
 
 
 class _Watch:

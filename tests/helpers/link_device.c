@@ -56,6 +56,10 @@ static void furnish(dac_link_axis *axis, const dac_converter *converter, const u
     }
     axis->mixed = place(DAC_TABLE_ROOM(index_bits), sizeof(dac_word));
 #endif
+#if DAC_LINK_MOVES_SLOW
+    for (unsigned i = 0; i < 2; i++)
+        axis->moved_gains[i] = place(SLOW_KNOTS, sizeof(int32_t));
+#endif
 }
 
 #if DAC_LINK_Z
@@ -127,6 +131,10 @@ static void free_slow(const dac_link_axis *axis)
         free(axis->slow[i].ratios);
     }
     free(axis->mixed);
+#if DAC_LINK_MOVES_SLOW
+    for (unsigned i = 0; i < 2; i++)
+        free(axis->moved_gains[i]);
+#endif
 }
 #endif
 
@@ -552,6 +560,15 @@ dac_link_started device_refusal(const device *d, unsigned fault)
     case 24: c.pixel_ticks[1] = NULL; break;
     case 25: c.pixel_ticks[1] = c.pixel_ticks[0]; break;
     case 26: c.table_pixels = 0; c.pixel_ticks[0] = NULL; break; /* none */
+#endif
+#if DAC_LINK_MOVES_SLOW
+    case 27: c.x.moved_gains[0] = NULL; break;
+    case 28: c.y.moved_gains[1] = NULL; break;
+    case 29: c.y.moved_gains[0] = c.x.moved_gains[1]; break;
+    case 30:
+        for (unsigned i = 0; i < 2; i++)
+            c.x.moved_gains[i] = c.y.moved_gains[i] = NULL; /* none */
+        break;
 #endif
     default: break;
     }

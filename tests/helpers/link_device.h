@@ -12,7 +12,7 @@ enum { SLOW_KNOTS = 65, SLOW_INDEX_BITS = 7 }; /* of every device; tests/link_de
 #if DAC_PIXEL_TABLE
 enum { TABLE_PIXELS = 16 }; /* likewise */
 #endif
-enum { AXIS_FAULTS = 20, FAULTS = 2 * AXIS_FAULTS + 11 }; /* of a configuration */
+enum { AXIS_FAULTS = 20, FAULTS = 2 * AXIS_FAULTS + 15 }; /* of a configuration */
 
 typedef struct {
     dac_converter x_converter, y_converter;

@@ -26,6 +26,7 @@ from replacing import replace
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, PIXEL_TABLE_WORD
+from tablegen.fixedpoint.frame_program import FACTOR_FRACTION_BITS, FrameProgram
 from tablegen.link.acceptance import first_objection
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import (
@@ -167,6 +168,7 @@ class Dialogue:
             order,
             degree,
             (More.MOVE if self._moves else More(0))
+            | (More.SLOW_MOVE if self._moves and slow else More(0))
             | (More.SLOW_PARTS if slow else More(0))
             | (More.PIXEL_TABLES if pixels else More(0))
             | (More.PLAY if plays else More(0))
@@ -273,6 +275,19 @@ class Dialogue:
             return resealed(image, bytes(data))
         return damaged_table(self.rng, image) if self.rng.random() < 0.3 else image
 
+    def _good_slow_image(self) -> ProgramImage:
+        """An image with a slow part of both axes that the device takes, if one is soon found."""
+        for _ in range(40):
+            program = random_slow_program(self.rng, self.shape)
+            if not (isinstance(program.x, FrameProgram) and isinstance(program.y, FrameProgram)):
+                continue
+            image = make_image(program, digest(self.rng))
+            contents = take_apart(image.data, image.info.x, image.info.y)
+            limits = widest(program.x.output), widest(program.y.output)
+            if first_objection(contents, *limits, None, self.order) is None:
+                return image
+        return self._some_image()
+
     def _some_slow_image(self) -> ProgramImage:
         program = random_slow_program(self.rng, self.shape)
         if self.pixels and self.rng.random() < 0.7:
@@ -328,6 +343,8 @@ class Dialogue:
                     self.seen[refusal.type, refusal.reason, "z"] += 1
             else:
                 self.seen[frame.type & 0x7F] += 1
+                if frame.type & 0x7F == Request.MOVE and isinstance(self.model.player.playing.x, FrameProgram):
+                    self.seen[Request.MOVE, "slow"] += 1
                 if frame.type & 0x7F in (Request.BEGIN, Request.DATA):
                     (self._received,) = struct.unpack_from("<I", frame.payload)
                 if frame.type & 0x7F == Request.CHALLENGE:
@@ -423,13 +440,19 @@ class Dialogue:
         ):
             self._send(self.talk.acting(Request.ABORT))
             self._image, _ = random_image(self.rng, self.shape, HARMONICS, "smooth", self.order)
+            if self.slow and self.rng.random() < 0.7:
+                self._image = self._good_slow_image()
             self._whole()
             self._tick(60)
+            playing = self.model.player.playing
         if playing is None:
             return
         words = []
-        for axis in (playing.x.output, playing.y.output):
-            gain, offset, one = axis.gain_word, axis.offset_word, 1 << axis.gain_q
+        has_factors = isinstance(playing.x, FrameProgram) != (self.slow and self.rng.random() < 0.03)
+        for program in (playing.x, playing.y):
+            axis, level = program.output, program.slow if isinstance(program, FrameProgram) else program.output
+            gain, offset, one = level.gain_word, level.offset_word, 1 << axis.gain_q
+            factor = round((1 << FACTOR_FRACTION_BITS) * self.rng.uniform(0.9, 1.0)) if has_factors else None
             kind = self.rng.random()
             if kind < 0.7:
                 gain = round(gain * self.rng.uniform(0.9, 1.0))
@@ -438,7 +461,9 @@ class Dialogue:
                 gain = int(self.rng.integers(-(1 << 17) - 2, (1 << 17) + 2))
             elif kind < 0.9:
                 offset += int(self.rng.integers(-(1 << axis.dac_bits), 1 << axis.dac_bits)) * one
-            words.append(AxisWords(gain, offset))
+            elif kind < 0.95 and has_factors:
+                factor = int(self.rng.integers(-(1 << 31), 1 << 31)) >> int(self.rng.integers(0, 20))
+            words.append(AxisWords(gain, offset, factor))
         wrong = int(self.rng.random() < 0.05)
         payload = bytearray(Move(self.model.status().generation + wrong, *words).pack())
         if self.rng.random() < 0.05:

@@ -1,4 +1,7 @@
-"""A scan that is moved at random by MOVE while it plays, and a check of every line that is played meanwhile."""
+"""A scan that is moved at random by MOVE while it plays, and a check of every line that is played meanwhile.
+
+There are straight scans, and scans with slow parts, as at an angle.
+"""
 
 import struct
 import zlib
@@ -7,6 +10,7 @@ from collections.abc import Iterable
 from typing import Any, Protocol
 
 import numpy as np
+from frame_programs import common_knots, scan_program
 from line_log import PlayedLine, WrongLine
 from link_programs import make_scan
 from link_talk import Talk
@@ -15,16 +19,49 @@ from numpy.typing import NDArray
 from replacing import replace
 
 from tablegen.device.commit_mode import CommitMode
-from tablegen.device.dual_program import DualProgram
+from tablegen.device.dual_program import AxisProgram, ScanProgram
 from tablegen.device.sequencer import Sequencer
-from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.frame_program import FACTOR_FRACTION_BITS, FrameProgram
 from tablegen.link.messages import REFUSAL, AxisWords, Move, Reason, Refusal, Request
+from tablegen.link.program_image import make_image
+from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import FLAGS
 
+
+def _slow_program(seed: int) -> ScanProgram:
+    """A program with slow parts that takes some third of the range of both axes."""
+    rng, schedule = np.random.default_rng(seed), BOOT.program.schedule
+    for _ in range(500):
+        program = common_knots(rng, scan_program(rng, SLOW_SHAPE, schedule, "xy"))
+        axes = _in_the_middle(program.x), _in_the_middle(program.y)
+        spans = [axis.extremes[1] - axis.extremes[0] for axis in axes]
+        if all(12_000 < span < 30_000 for span in spans) and max(axis.extremes[2] for axis in axes) < _MOST_STEP:
+            return replace(program, x=axes[0], y=axes[1])
+    raise AssertionError
+
+
+def _in_the_middle(axis: AxisProgram) -> FrameProgram:
+    """An axis about the middle of its converter, with other limits and fewer of what is mixed into its lines."""
+    assert isinstance(axis, FrameProgram)
+    limits = {"code_min": 2000, "code_max": 63000, "park_code": 30000, "max_step": _MOST_STEP}
+    slow = replace(axis.slow, offset_word=32500 << axis.output.gain_q)
+    ratios = replace(axis.ratios, words=axis.ratios.words // 8)
+    return replace(axis, fast=replace(axis.fast, output=replace(axis.output, **limits)), ratios=ratios, slow=slow)
+
+
 BOOT, SCAN = (make_scan(seed, ticks=40, lines=5) for seed in (1, 3))  # y of both in steps
+_MOST_STEP = 6000
+SLOW_SHAPE = SequencerShape(16, 3, 5, 16, 3, 4, 16)
+SLOW_SCAN = _slow_program(2)
 _BIT = {name: 1 << bit for bit, name in enumerate(FLAGS)}
 _RECORD = np.dtype([("x", "<u4"), ("y", "<u4"), ("markers", "u1")])
-_REFUSED = {Reason.OUTPUT, Reason.RANGE, Reason.SLEW, Reason.JUMP}  # what the random words may be refused for
+_REFUSED = {
+    Reason.OUTPUT,
+    Reason.WORD,
+    Reason.RANGE,
+    Reason.SLEW,
+    Reason.JUMP,
+}  # what the random words may be refused for
 
 
 class MovingDevice(Protocol):
@@ -50,16 +87,16 @@ class MovedLines:
     inside the limits, and no step is larger than the slew guard allows.
     """
 
-    def __init__(self, program: DualProgram, generation: int) -> None:
+    def __init__(self, program: ScanProgram, generation: int) -> None:
         self.lines, self.generation = 0, generation
         self._sequencer = Sequencer(program)
         self._sequencer.arm()
         self._sequencer.trigger()
         self._codes = np.array([self._sequencer.codes])
         self._program = program
-        self._offered: dict[int, DualProgram] = {}
+        self._offered: dict[int, ScanProgram] = {}
 
-    def offer(self, generation: int, program: DualProgram) -> None:
+    def offer(self, generation: int, program: ScanProgram) -> None:
         """The program may play from now on."""
         self._offered[generation] = program
 
@@ -106,8 +143,11 @@ class MovedLines:
         self._codes = codes[-1:]
 
 
-def random_words(rng: Generator, output: Output) -> AxisWords:
+def random_words(rng: Generator, axis: AxisProgram) -> AxisWords:
     """Words that a device may take, mostly; some of them are anything."""
+    if isinstance(axis, FrameProgram):
+        return _random_slow_words(rng, axis)
+    output = axis.output
     gain, offset, one = output.gain_word, output.offset_word, 1 << output.gain_q
     kind = rng.random()
     if kind < 0.8:
@@ -119,29 +159,56 @@ def random_words(rng: Generator, output: Output) -> AxisWords:
     return AxisWords(gain, offset + int(rng.integers(-(1 << 17), 1 << 17)) * one)
 
 
-def moved(program: DualProgram, x: AxisWords, y: AxisWords) -> DualProgram:
-    """The program with other words."""
-    axes = {
-        name: replace(axis, output=replace(axis.output, gain_word=words.gain_word, offset_word=words.offset_word))
-        for name, axis, words in (("x", program.x, x), ("y", program.y, y))
-    }
-    return replace(program, **axes)
+def _random_slow_words(rng: Generator, axis: FrameProgram) -> AxisWords:
+    """As above: of up to twice the size, on either side, and mirrored; some of them are anything."""
+    one, gain, kind = 1 << axis.output.gain_q, axis.slow.gain_word, rng.random()
+    size = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 2.0))
+    factor, gain = round(size * float(rng.uniform(0.8, 1.2)) * (1 << FACTOR_FRACTION_BITS)), round(size * gain)
+    offset = axis.slow.offset_word + round(float(rng.uniform(-15000.0, 15000.0)) * one)
+    if kind < 0.05:
+        factor = int(rng.integers(-(1 << 31), 1 << 31)) >> int(rng.integers(0, 14))
+    elif kind < 0.1:
+        gain = int(rng.integers(-(1 << 17) - 9, (1 << 17) + 9))
+    elif kind < 0.15:
+        offset += int(rng.integers(-(1 << 17), 1 << 17)) * one
+    return AxisWords(gain, offset, factor)
+
+
+def moved(program: ScanProgram, x: AxisWords, y: AxisWords) -> ScanProgram:
+    """The program as it was uploaded, with other words; as it was where gains do not fit, which no device takes."""
+    try:
+        return replace(program, x=_moved(program.x, x), y=_moved(program.y, y))
+    except OverflowError:
+        return program
+
+
+def _moved(axis: AxisProgram, words: AxisWords) -> AxisProgram:
+    level = {"gain_word": words.gain_word, "offset_word": words.offset_word}
+    if not isinstance(axis, FrameProgram):
+        return replace(axis, output=replace(axis.output, **level))
+    assert words.factor_word is not None
+    gains = [(gain * words.factor_word + (1 << 15)) // (1 << 16) for gain in axis.gains.words.tolist()]
+    return replace(axis, gains=replace(axis.gains, words=np.array(gains)), slow=replace(axis.slow, **level))
 
 
 class MovedScan:
     """A host that moves the scan of a device again and again; ``seen`` counts what the device answers to a MOVE."""
 
-    def __init__(self, device: MovingDevice, seed: int) -> None:
+    def __init__(self, device: MovingDevice, seed: int, slow: bool = False) -> None:
+        """Play ``SCAN`` on a device that boots ``BOOT``, or ``SLOW_SCAN``."""
+        program, image = SCAN.program, SCAN.image(False)
+        if slow:
+            program, image = SLOW_SCAN, make_image(SLOW_SCAN, 64 * "5")
         self.device, self.rng, self.talk = device, np.random.default_rng(seed), Talk()
         self.seen: Counter[str] = Counter()
         device.receive(self.talk.hello())
         device.tick(400)
-        for wire in self.talk.upload(SCAN.image(False)):
+        for wire in self.talk.upload(image):
             device.receive(wire)
-        device.receive(self.talk.commit(SCAN.image(False)))
+        device.receive(self.talk.commit(image))
         device.tick(400)  # parked at the new park codes
         list(device.lines())
-        self._program = SCAN.program
+        self._program = program
         self.check = MovedLines(self._program, 2)
         self._generation, self._waits = 2, False
         device.receive(self.talk.acting(Request.ARM, bytes(4)) + self.talk.acting(Request.TRIGGER))
@@ -157,7 +224,7 @@ class MovedScan:
         self._tick(80)
 
     def _move(self) -> None:
-        words = [random_words(self.rng, axis.output) for axis in (SCAN.program.x, SCAN.program.y)]
+        words = [random_words(self.rng, axis) for axis in (self._program.x, self._program.y)]
         if not self._waits:
             self.check.offer(self._generation + 1, moved(self._program, *words))
         self._waits = True

@@ -8,20 +8,30 @@ from client_rig import KEY, Watched, client, model
 from line_log import PlayedLine, WrongLine
 from link_programs import INFO, make_scan
 from moved_scans import BOOT as OTHER_BOOT
-from moved_scans import MovedScan, moved
+from moved_scans import SLOW_SCAN, MovedScan, moved
 from replacing import replace
 from sets import LONG_TEST
 from test_line_log import Log
 
 from tablegen.device.commit_mode import CommitMode
+from tablegen.device.dual_program import ScanProgram
+from tablegen.fixedpoint.frame_program import FACTOR_FRACTION_BITS, FrameProgram
 from tablegen.link.errors import LinkLost, Refused, Unsuitable
 from tablegen.link.frames import FrameReader
-from tablegen.link.messages import AxisWords, DeviceState, Feature, More, Reason, Request, Upload
+from tablegen.link.messages import SPLINE_DEGREE, AxisWords, DeviceState, Feature, More, Reason, Request, Upload
 from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
 from tablegen.link.program_image import make_image
 
 MOVES = replace(INFO, features=INFO.features | Feature.COMMIT_MODES, more=More.MOVE)
+SLOW_MOVES = replace(
+    MOVES,
+    more=More.MOVE | More.SLOW_PARTS | More.SLOW_MOVE,
+    slow_knots=65,
+    slow_index_bits=7,
+    degree=SPLINE_DEGREE,
+    image_bytes=4000,
+)
 SCAN = make_scan(3)
 IMAGES = [SCAN.image(False), SCAN.image(True)]
 
@@ -140,9 +150,10 @@ def test_an_image_that_was_moved_is_not_committed_again() -> None:
 class _Moving:
     """A model whose lines are noted as firmware notes them."""
 
-    def __init__(self) -> None:
+    def __init__(self, slow: bool = False) -> None:
         self._log = Log()
-        self._device = ModelDevice(MOVES, SequencerPlayer(OTHER_BOOT.program, on_tick=self._log))
+        info = SLOW_MOVES if slow else MOVES
+        self._device = ModelDevice(info, SequencerPlayer(OTHER_BOOT.program, on_tick=self._log))
         self.receive, self.transmit, self.tick = self._device.receive, self._device.transmit, self._device.tick
 
     def lines(self) -> list[tuple[int, ...]]:
@@ -170,11 +181,85 @@ def test_a_line_that_cannot_be_is_noticed(change: dict[str, int]) -> None:
         scan.check.follow([replace(log[5], **{name: getattr(log[5], name) ^ by})])
 
 
+@pytest.mark.parametrize("slow", [False, True], ids=["straight", "slow parts"])
 @pytest.mark.parametrize(
     "moves", [60, pytest.param(3000, marks=pytest.mark.rest), pytest.param(100_000, marks=LONG_TEST)]
 )
-def test_no_random_move_leaves_a_limit_or_restarts_a_frame(moves: int) -> None:
-    scan = MovedScan(_Moving(), 2)
+def test_no_random_move_leaves_a_limit_or_restarts_a_frame(moves: int, slow: bool) -> None:
+    scan = MovedScan(_Moving(slow), 2, slow)
     scan.play(moves)
     assert scan.seen["MOVED"] > moves // 4
     assert scan.check.generation == 2 + scan.seen["MOVED"]
+    assert (scan.seen["WORD"] > 0) == slow
+
+
+# Slow parts
+
+
+def _slow_words(program: ScanProgram, share: float = 0.9, codes: int = 300) -> tuple[AxisWords, AxisWords]:
+    """Words of a smaller scan with slow parts, beside where it was uploaded."""
+    x, y = (
+        AxisWords(
+            round(share * axis.slow.gain_word),
+            axis.slow.offset_word + (codes << axis.output.gain_q),
+            round(share * (1 << FACTOR_FRACTION_BITS)),
+        )
+        for axis in (program.x, program.y)
+        if isinstance(axis, FrameProgram)
+    )
+    return x, y
+
+
+@pytest.mark.parametrize("key", [b"", KEY], ids=["open", "key"])
+def test_a_program_with_slow_parts_is_moved(key: bytes) -> None:
+    """Gains are those of the upload times the factor, after another move too."""
+    line, image = Watched(model(SLOW_MOVES, key)), make_image(SLOW_SCAN, 64 * "5")
+    with client(line, key=key or None) as device:
+        device.upload(image)
+        device.arm()
+        device.trigger()
+        device.wait_for(DeviceState.PLAYING, 5.0)
+        for generation, share in enumerate((0.5, 0.9), 2):
+            words = _slow_words(SLOW_SCAN, share)
+            assert device.move(*words, generation).generation == generation + 1
+            moved_scan = moved(SLOW_SCAN, *words)
+            playing = line.device.player.playing
+            assert playing is not None
+            for name in ("x", "y"):
+                before, now = getattr(SLOW_SCAN, name), getattr(playing, name)
+                assert now.gains.words == pytest.approx(share * before.gains.words, abs=2.0)
+                assert now.slow.gain_word == pytest.approx(share * before.slow.gain_word, abs=0.5)
+            assert device.readback() == make_image(moved_scan, bytes(32).hex()).data
+        assert device.status().moved
+        back = AxisWords(SLOW_SCAN.x.slow.gain_word, SLOW_SCAN.x.slow.offset_word, 1 << FACTOR_FRACTION_BITS)
+        device.move(back, replace(_slow_words(SLOW_SCAN, 1.0, 0)[1]), 4)
+        assert device.readback() == image.data
+    sizes = {len(frame.payload) for frame in line.frames if frame.type == Request.MOVE}
+    assert sizes == {36 + (16 if key else 0)}
+
+
+def test_which_moves_a_program_takes() -> None:
+    """Factors belong to a program with slow parts, and a gain has 18 bits."""
+    with client(Watched(model(SLOW_MOVES))) as device:
+        device.upload(make_image(SLOW_SCAN, 64 * "5"))
+        with pytest.raises(Refused, match=r"\(slow_part\)"):
+            device.move(*_words(), 2)
+        x, y = _slow_words(SLOW_SCAN)
+        with pytest.raises(Refused, match=r"\(word\)") as caught:
+            device.move(x, replace(y, factor_word=1 << 22), 2)
+        gains = SLOW_SCAN.y.gains.words.tolist()
+        knot = next(at for at, gain in enumerate(gains) if not -(1 << 17) <= gain << 6 < 1 << 17)
+        slow = SLOW_SCAN.y
+        assert caught.value.detail == 1 + 2 * (2 * len(slow.fast.words) + len(slow.slow.words) + knot)
+        device.upload(IMAGES[0])
+        with pytest.raises(Refused, match=r"\(slow_part\)"):
+            device.move(x, y, 3)
+        assert device.status().generation == 3
+    line = Watched(model(replace(SLOW_MOVES, more=SLOW_MOVES.more & ~More.SLOW_MOVE)))
+    with client(line) as device:
+        device.upload(make_image(SLOW_SCAN, 64 * "5"))
+        with pytest.raises(Unsuitable, match="moved_gains"):
+            device.move(x, y, 2)
+        with pytest.raises(Refused, match=r"\(slow_part\)"):
+            device.move(*_words(), 2)
+    assert line.count(Request.MOVE) == 1

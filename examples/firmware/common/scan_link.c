@@ -63,7 +63,14 @@ static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
     static int16_t axis##_ratios[2][knots]
 #define HAS_SLOW(axis)                                                                                                \
     , {{axis##_second[0], axis##_slow_tables[0], axis##_gains[0], axis##_ratios[0]},                                  \
-       {axis##_second[1], axis##_slow_tables[1], axis##_gains[1], axis##_ratios[1]}}, axis##_mixed
+       {axis##_second[1], axis##_slow_tables[1], axis##_gains[1], axis##_ratios[1]}}, axis##_mixed MOVES(axis)
+#if DAC_MOVE && TURNED
+#define MOVES(axis) , {axis##_moved_gains[0], axis##_moved_gains[1]}
+#elif DAC_MOVE && DAC_SLOW_PART
+#define MOVES(axis) , {NULL, NULL}
+#else
+#define MOVES(axis)
+#endif
 #if TURNED
 #ifndef LINK_SLOW_KNOTS /* frames of fewer than 17 lines have fewer, and others are to be taken */
 #define LINK_SLOW_KNOTS LARGER(LARGER(WORDS_OF(NAMED(_x_gains)), WORDS_OF(NAMED(_y_gains))), 17u)
@@ -73,9 +80,12 @@ static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
 #endif
 SLOW_MEMORY(x, LINK_X_INDEX_BITS, LINK_SLOW_KNOTS, LINK_SLOW_INDEX_BITS);
 SLOW_MEMORY(y, LINK_Y_INDEX_BITS, LINK_SLOW_KNOTS, LINK_SLOW_INDEX_BITS);
+#if DAC_MOVE
+static int32_t x_moved_gains[2][LINK_SLOW_KNOTS], y_moved_gains[2][LINK_SLOW_KNOTS];
+#endif
 #define SLOW_OF(axis) HAS_SLOW(axis)
 #elif DAC_SLOW_PART
-#define SLOW_OF(axis) , {{NULL, NULL, NULL, NULL}, {NULL, NULL, NULL, NULL}}, NULL
+#define SLOW_OF(axis) , {{NULL, NULL, NULL, NULL}, {NULL, NULL, NULL, NULL}}, NULL MOVES(axis)
 #else
 #define SLOW_OF(axis)
 #endif
