@@ -25,8 +25,9 @@ from turned_scans import write_turned
 
 from tablegen.device.commit_mode import CommitMode
 from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.frame_words import FrameMove
 from tablegen.link.acceptance import first_objection
-from tablegen.link.messages import DeviceState, More, Reason, Request
+from tablegen.link.messages import AxisWords, DeviceState, More, Move, Reason, Request
 from tablegen.link.prepare import PreparedScan
 from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image, take_apart
 from tablegen.link.refusal_reasons import explain
@@ -64,9 +65,24 @@ class Scans:
     straight: PreparedScan
     folder: Path
 
+    @property
+    def moves(self) -> tuple[FrameMove, FrameMove]:
+        """Words that make ``first`` smaller and shift it."""
+        x, y = self.first.program.x, self.first.program.y
+        assert isinstance(x, FrameProgram)
+        assert isinstance(y, FrameProgram)
+        codes = 1 << x.output.gain_q
+        return (
+            FrameMove.of(x, 0.8, 0.8, x.slow.offset_word / codes + 1500.25),
+            FrameMove.of(y, 0.7, 0.8, y.slow.offset_word / codes - 800.5),
+        )
+
     def check(self, simulation: Simulation) -> LineCheck:
         """Hold the log against the model. Raises ``WrongLine``."""
         check = LineCheck(self.boot.program, keeps=True)
+        first = self.first.program
+        x, y = (move.program(axis) for move, axis in zip(self.moves, (first.x, first.y), strict=True))  # type: ignore[arg-type]
+        check.offer("moved", replace(first, x=x, y=y))
         for name in ("first", "second", "more"):
             check.offer(name, getattr(self, name).program)
         check.follow(PlayedLine.parse(line) for line in simulation.lines())
@@ -126,18 +142,20 @@ def upload(host: Host, scan: PreparedScan, mode: CommitMode, generation: int) ->
     assert host.read_back(len(image.data)) == image.data
 
 
-def test_a_frame_goes_on_with_another_scan(host: Host, scans: Scans) -> None:
+def test_a_frame_goes_on_with_another_scan_and_a_move(host: Host, scans: Scans) -> None:
     info = host.start()
-    assert info.more & More.SLOW_PARTS
+    assert info.more == More.SLOW_PARTS | More.MOVE | More.SLOW_MOVE
     assert (info.slow_knots, info.slow_index_bits) == (17, 6)
     upload(host, scans.first, CommitMode.KEEP, 2)
+    words = [AxisWords(move.gain_word, move.offset_word, move.factor_word) for move in scans.moves]
+    assert is_answer(host.ask(host.talk.acting(Request.MOVE, Move(2, *words).pack())), Request.MOVE)
     host.play(LINES)
     assert is_answer(host.ask(host.talk.acting(Request.PARK)), Request.PARK)
     host.play(10)
     assert host.status().state is DeviceState.PARKED
     check = scans.check(host.simulation)
-    assert check.taken == {1: "boot", 2: "first"}
-    assert check.kept == {2}, "a frame that goes on, and does not begin"
+    assert check.taken == {1: "boot", 2: "first", 3: "moved"}
+    assert check.kept == {2, 3}, "a frame that goes on, and does not begin"
     assert check.lines > 3 * LINES
 
     # Negative control: one line, as if a tick of it had been another.
