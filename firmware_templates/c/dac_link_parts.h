@@ -311,7 +311,7 @@ uint8_t dac_link_put_z_status(const dac_link *l, uint8_t *at);
 
 #if DAC_MOVE
 /* dac_link_move.c */
-#define DAC_LINK_MOVE_BYTES 28   /* generation; gain, offset low and high of x, then of y */
+#define DAC_LINK_MOVE_BYTES 28  /* generation; gain, offset low and high of x, then of y */
 #define DAC_LINK_FACTOR_BYTES 8 /* behind them, for slow parts: factor of the gains of x, then of y */
 
 /* Whether a link moves programs with slow parts. */
@@ -329,9 +329,9 @@ static inline bool dac_link_moves_slow(const dac_link_config *config)
 static inline uint8_t dac_link_move_bytes(const dac_link_config *config, uint8_t length)
 {
     const uint8_t most = DAC_LINK_MOVE_BYTES + DAC_LINK_FACTOR_BYTES;
+    const bool has_factors = length == most || length == most + DAC_LINK_TAG;
 
-    return dac_link_moves_slow(config) && (length == most || length == most + DAC_LINK_TAG) ? most
-                                                                                          : DAC_LINK_MOVE_BYTES;
+    return has_factors && dac_link_moves_slow(config) ? most : DAC_LINK_MOVE_BYTES;
 }
 
 dac_link_finding dac_link_move(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
