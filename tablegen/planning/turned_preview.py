@@ -10,21 +10,22 @@ import numpy as np
 from msgspec import Struct, structs
 
 from tablegen.base.input_errors import Problems, Unphysical
+from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
 from tablegen.config.load import Setup
 from tablegen.device.dual_program import ScanProgram
-from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
 from tablegen.fixedpoint.frame_words import scaled_frame
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.axis_request import ScanRequest
 from tablegen.planning.turned_plan import (
     FrameGeometry,
     TurnedAxis,
     TurnedPlan,
+    allowed_step,
+    at_0_degrees,
     check_reach,
-    plan_at_0,
     plan_tilts,
-    within_range,
 )
 from tablegen.waveform.series import FourierSeries
 
@@ -50,25 +51,27 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     """Scale the program that plays to another scan; None where it has other lines or windows, or leaves a limit.
 
     Nothing is learnt for z and aux, so those of the preview are exact; there is no preview where one begins or ends.
+    Of the scan at 0 degrees only schedule and voltages are needed: what else of it is refused, the plan refuses.
 
     Raises
     ------
     Rejected
-        If the scan is refused at 0 degrees.
+        If the schedule or the voltages of the scan at 0 degrees are refused.
     """
-    straight = plan_at_0(setup)
-    old, new = plan.schedule, straight.schedule
+    request = ScanRequest.of(at_0_degrees(setup))
+    old, new = plan.schedule, request.schedule
     same_keys = ("ticks", "lines", "turn_tick", "forward", "backward", "up", "down")
-    if any(getattr(old, key) != getattr(new, key) for key in same_keys):
+    if setup.scan.x.motion != "line" or any(getattr(old, key) != getattr(new, key) for key in same_keys):
         return None
-    geometry, problems = FrameGeometry.of(setup, straight), Problems()
-    shares, tilts = geometry.shares, plan_tilts(setup, straight, geometry, problems)
+    sizes = request.x.voltages.size_nm, request.y.voltages.size_nm
+    geometry, problems = FrameGeometry.of(setup, new, sizes), Problems()
+    shares, tilts = geometry.shares, plan_tilts(setup, new, request.x.harmonics, geometry, problems)
     if problems.entries or tilts.keys() != {tilt.name for tilt in plan.tilts}:
         return None
     programs, errors = [], []
-    for axis, line in zip(plan.axes, straight.lines, strict=True):
+    for axis, voltages in zip(plan.axes, (request.x.voltages, request.y.voltages), strict=True):
         try:
-            program, error = _scaled(setup, plan, straight, axis, line, *shares[axis.axis])
+            program, error = _scaled(setup, axis, voltages.driver.share(voltages.v_offset), *shares[axis.axis])
         except (Unphysical, OverflowError):
             return None
         if program is None:
@@ -80,12 +83,15 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
 
 
 def _scaled(
-    setup: Setup, plan: TurnedPlan, straight: Plan, axis: TurnedAxis, line: LinePlan, fast_nm: float, slow_nm: float
+    setup: Setup, axis: TurnedAxis, middle: float, fast_nm: float, slow_nm: float
 ) -> tuple[FrameProgram | None, float]:
-    """Return the program of an axis with its parts scaled, None if it leaves a limit; and its error in percent."""
-    motion = replace(
-        axis.motion, fast_nm=fast_nm, slow_nm=slow_nm, centre=line.drive.driver.share(line.drive.v_offset), layer=None
-    )
+    """Return the program of an axis with its parts scaled, None if it leaves a limit; and its error in percent.
+
+    ``middle`` is the offset of the new place, of v_max.
+    """
+    if min(abs(line.centre - middle) for line in axis.known.operator.lines) > CENTRE_REACH:
+        raise Unphysical("no trace of the operator is near this offset")
+    motion = replace(axis.motion, fast_nm=fast_nm, slow_nm=slow_nm, centre=middle, layer=None)
     centre = axis.drive.slow.a0 + motion.centre - axis.motion.centre
     longest = max(motion.longest_nm, axis.motion.longest_nm)
     fast = _ratio(fast_nm, axis.motion.fast_nm, _LEAST_SHARE * longest)
@@ -98,9 +104,16 @@ def _scaled(
             slow *= slow_nm / moved_slow if abs(moved_slow) > _LEAST_SHARE * abs(slow_nm) else 1.0
     check_reach(axis.known, drive, motion.lines)
     program = scaled_frame(axis.program, fast, slow, axis.converter.code(axis.known.driver.volts(centre)))
-    problems = Problems()
-    program = within_range(setup, straight, line, program, problems)
-    return None if problems.entries else program, 100.0 * error_nm / motion.longest_nm
+    return _guarded(setup, axis, program), 100.0 * error_nm / motion.longest_nm
+
+
+def _guarded(setup: Setup, axis: TurnedAxis, program: FrameProgram) -> FrameProgram | None:
+    """Return the program with its slew guard; None if it leaves the range or the slew rate."""
+    output, allowed = program.output, allowed_step(setup, axis.axis, axis.converter)
+    least, most, steepest = played_extremes(program)
+    if least < output.code_min or most > output.code_max or (allowed is not None and steepest > allowed):
+        return None
+    return program.guarded(min(2 * steepest, (1 << output.dac_bits) - 1) if allowed is None else allowed)
 
 
 def _ratio(new_nm: float, old_nm: float, least_nm: float) -> float:
