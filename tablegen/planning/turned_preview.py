@@ -14,7 +14,7 @@ from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
 from tablegen.config.load import Setup
 from tablegen.device.dual_program import ScanProgram
-from tablegen.fixedpoint.frame_program import FrameProgram, played_extremes
+from tablegen.fixedpoint.frame_program import FrameProgram, played_bounds, played_extremes
 from tablegen.fixedpoint.frame_words import scaled_frame
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.axis_request import ScanRequest
@@ -108,12 +108,15 @@ def _scaled(
 
 
 def _guarded(setup: Setup, axis: TurnedAxis, program: FrameProgram) -> FrameProgram | None:
-    """Return the program with its slew guard; None if it leaves the range or the slew rate."""
+    """Return the program with its slew guard; None if it leaves the range or the slew rate.
+
+    Where the scan file names no slew rate, the guard of the program that plays stays, unless a step is longer.
+    """
     output, allowed = program.output, allowed_step(setup, axis.axis, axis.converter)
-    least, most, steepest = played_extremes(program)
-    if least < output.code_min or most > output.code_max or (allowed is not None and steepest > allowed):
-        return None
-    return program.guarded(min(2 * steepest, (1 << output.dac_bits) - 1) if allowed is None else allowed)
+    for least, most, steepest in (extremes(program) for extremes in (played_bounds, played_extremes)):
+        if output.code_min <= least and most <= output.code_max and (allowed is None or steepest <= allowed):
+            return program.guarded(max(output.max_step, steepest) if allowed is None else allowed)
+    return None
 
 
 def _ratio(new_nm: float, old_nm: float, least_nm: float) -> float:
