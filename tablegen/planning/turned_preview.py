@@ -31,6 +31,7 @@ from tablegen.waveform.series import FourierSeries
 
 _ROUNDS = 1
 _SAMPLES = 128  # of a line
+_SAMPLES_OF_ROUNDS = 64  # before the last play, which gives the error
 _MOST_LINES = 24  # of a frame that are played
 _LEAST_SHARE = 0.02  # of the longer motion: a part that is shorter is not made longer
 
@@ -98,7 +99,8 @@ def _scaled(
     slow = _ratio(slow_nm, axis.motion.slow_nm, _LEAST_SHARE * longest)
     for number in range(_ROUNDS + 1):
         drive = _drive(axis.drive, fast, slow, centre)
-        moved_fast, moved_slow, error_nm = _played(axis, motion, drive)
+        samples = _SAMPLES_OF_ROUNDS if number < _ROUNDS else _SAMPLES
+        moved_fast, moved_slow, error_nm = _played(axis, motion, drive, samples)
         if number < _ROUNDS:
             fast *= fast_nm / moved_fast if abs(moved_fast) > _LEAST_SHARE * abs(fast_nm) else 1.0
             slow *= slow_nm / moved_slow if abs(moved_slow) > _LEAST_SHARE * abs(slow_nm) else 1.0
@@ -139,16 +141,16 @@ def _drive(drive: FrameDrive, fast: float, slow: float, centre: float) -> FrameD
     return replace(drive, slow=series, gains=fast * drive.gains)
 
 
-def _played(axis: TurnedAxis, motion: FrameMotion, drive: FrameDrive) -> tuple[float, float, float]:
+def _played(axis: TurnedAxis, motion: FrameMotion, drive: FrameDrive, samples: int) -> tuple[float, float, float]:
     """Return the motions of the line and of the frame in nm, and the largest distance from the wanted position.
 
-    Of a long frame only some lines are played.
+    Of a long frame only some lines are played, at so many samples of each.
     """
     lines = np.arange(0, motion.lines, max(motion.lines // _MOST_LINES, 1))
-    t = np.arange(_SAMPLES) / _SAMPLES
+    t = np.arange(samples) / samples
     rows = drive.at(motion.lines, t)[lines]
     u = np.clip(rows.ravel(), 0.0, 1.0)
-    time_s = np.arange(len(u) + 1) / (_SAMPLES * motion.line_rate_hz)
+    time_s = np.arange(len(u) + 1) / (samples * motion.line_rate_hz)
     position = axis.piezo.position(time_s, np.append(u, u[0]))[:-1].reshape(rows.shape)
     at = np.ix_(np.flatnonzero(motion.imaged[lines]), np.flatnonzero(motion.inside(t)))
     along = np.broadcast_to(motion.fast(t) - 0.5, rows.shape)[at].ravel()
