@@ -77,9 +77,7 @@ def played_frame(plan: TurnedPlan) -> "ImagedFrame":
 
 def frame_codes(axis: TurnedAxis, ticks: Ints) -> Ints:
     """Return the codes of a frame at some ticks of each line, unshaped, shape (lines, len(ticks))."""
-    program = axis.program
-    lines = [program.at(line, ticks) for line in range(program.lines)]
-    return program.output.clamp(np.stack(lines))
+    return axis.program.output.clamp(axis.program.at_all(ticks))
 
 
 def played_position(axis: TurnedAxis, codes: Ints, ticks: Ints, line_ticks: int) -> Floats:

@@ -10,6 +10,7 @@ In line l of a frame, at tick k of L, as docs/decisions/0089 has it::
 Shaping, clamp, slew guard and coding of the converter follow as for every program.
 """
 
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 from math import ceil
@@ -23,7 +24,7 @@ from tablegen.fixedpoint.phase import PHASE_BITS, RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import saturate, shift_round, signed_limits
 from tablegen.fixedpoint.shaping import Remainders
-from tablegen.fixedpoint.spline import cubic, of_segments, segments
+from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, SPLINE_UNIT, cubic, of_segments, segments
 from tablegen.numerics.arrays import Ints, freeze
 
 RATIO_BITS = 16
@@ -33,6 +34,7 @@ SLOW_BITS = 43  # of an offset word
 SUM_BITS = 44  # of product and offset before the rounding
 MOST_KNOTS = 65
 FACTOR_FRACTION_BITS = 16  # of a factor of all gains, which has 32 bits
+_BLOCK = 1 << 15  # samples that are computed at a time, so that they fit the cache
 
 
 class Knots(Struct, frozen=True, eq=False):
@@ -178,8 +180,23 @@ class FrameProgram(Struct, frozen=True, eq=False, dict=True):
         Ints
             Saturated to the width of the fast words, of their shape.
         """
-        ratio = int(self.ratios.at(np.array(line)))
-        return saturate(self.fast.words + shift_round(ratio * self.second, RATIO_FRACTION_BITS), self.fast.bits)
+        return self.tables(np.array(line))
+
+    def tables(self, lines: Ints) -> Ints:
+        """Return the words of the tables that play in lines.
+
+        Parameters
+        ----------
+        lines
+            Lines in [0, lines), any shape.
+
+        Returns
+        -------
+        Ints
+            Saturated to the width of the fast words, of the shape of ``lines`` and of these words.
+        """
+        mixed = shift_round(self.ratios.at(lines)[..., None] * self.second, RATIO_FRACTION_BITS)
+        return saturate(self.fast.words + mixed, self.fast.bits)
 
     @property
     def output(self) -> Output:
@@ -276,6 +293,26 @@ class FrameProgram(Struct, frozen=True, eq=False, dict=True):
             return self.unclamped(first, count).ravel()
         return remainders.codes(self.output.with_remainders(self._sums(first, count).ravel()))
 
+    @property
+    def starts(self) -> Ints:
+        """The codes of the first tick of each line before the clamp, unshaped, shape (lines,)."""
+        return np.asarray(self.at_all(np.zeros(1, dtype=np.int64))[:, 0])
+
+    def at_all(self, k: Ints) -> Ints:
+        """Return the codes of the same ticks of every line before the clamp, unshaped.
+
+        Parameters
+        ----------
+        k
+            Ticks in [0, ticks of a line), shape (n,).
+
+        Returns
+        -------
+        Ints
+            Codes, shape (lines, n).
+        """
+        return shift_round(self._sums(0, self.lines, k), self.output.gain_q)
+
     def frame(self) -> Ints:
         """Return the codes of a frame before the slew guard, unshaped.
 
@@ -291,13 +328,49 @@ class FrameProgram(Struct, frozen=True, eq=False, dict=True):
         """The least and the greatest code of a frame before the clamp, and the largest step of a tick, unshaped."""
         least, most, steepest = 1 << 40, -(1 << 40), 0
         before = int(self.at(self.lines - 1, np.array([self.fast.phase.ticks - 1]))[0])
-        for line in range(self.lines):
-            codes = self.unclamped(line)[0]
+        for first, count in self._blocks(self.fast.phase.ticks):
+            codes = self.unclamped(first, count).ravel()
             least, most = min(least, int(np.min(codes))), max(most, int(np.max(codes)))
             steps = np.diff(codes, prepend=before)
             steepest = max(steepest, int(np.max(steps)), -int(np.min(steps)))
             before = int(codes[-1])
         return least, most, steepest
+
+    @cached_property
+    def bounds(self) -> tuple[int, int, int]:
+        """What ``extremes`` do not exceed, by the words of the tables: a fraction of the time.
+
+        A spline stays between 12 times its words, and its slope between 12 times their differences. A sample is within
+        1 of it, and a tick goes on by no more than its share of the segments and one fraction.
+        """
+        if self.fast.mode != "cubic":
+            return self.extremes
+        ticks, length = self.fast.phase.ticks, len(self.fast.words)
+        ends = self.at_all(np.array([0, ticks - 1]))
+        steepest = int(np.max(np.abs(np.roll(ends[:, 0], -1) - ends[:, 1])))
+        least, most = int(np.min(ends)), int(np.max(ends))
+        for first, count in self._blocks(length):
+            lines = np.arange(first, first + count)
+            tables, gains = self.tables(lines), self.gains.at(lines)
+            slow, ramps = self.slow.at(lines, self.lines), self._ramps(first, first + count)
+            low, high = (SPLINE_UNIT * gains * end for end in (np.min(tables, axis=1), np.max(tables, axis=1)))
+            behind = (ticks - 1) * ramps
+            lowest = int(np.min(np.minimum(low, high) + slow + np.minimum(behind, 0)))
+            highest = int(np.max(np.maximum(low, high) + slow + np.maximum(behind, 0)))
+            rise = np.max(np.abs(np.diff(tables, axis=1, append=tables[:, :1])), axis=1)
+            advance = (length << SPLINE_FRACTION_BITS) + ticks  # of 2^18 ticks
+            samples = SPLINE_UNIT * rise * advance // (ticks << SPLINE_FRACTION_BITS) + 3
+            step = int(np.max(np.abs(gains) * samples + np.abs(ramps)))
+            least = min(least, shift_round(lowest, self.output.gain_q))
+            most = max(most, shift_round(highest, self.output.gain_q))
+            steepest = max(steepest, -(-step >> self.output.gain_q))
+        return least, most, steepest
+
+    def _blocks(self, of_line: int) -> Iterator[tuple[int, int]]:
+        """Yield the first line and the count of blocks of lines that have so many values each."""
+        count = max(_BLOCK // of_line, 1)
+        for first in range(0, self.lines, count):
+            yield first, min(count, self.lines - first)
 
     def _ramps(self, first: int, stop: int) -> Ints:
         step = RationalPhase(self.fast.phase.ticks).step
@@ -318,12 +391,23 @@ class FrameProgram(Struct, frozen=True, eq=False, dict=True):
         if self.fast.mode != "cubic":
             return np.stack([replace(self.fast, words=self.table(line)).samples(k) for line in lines])
         segment, fraction = segments(self.fast.phase.at(k), self.fast.index_bits)
-        return np.stack([of_segments(self.table(line), segment, fraction) for line in lines])
+        count = max(_BLOCK // max(len(k), 1), 1)
+        blocks = [lines[first : first + count] for first in range(0, len(lines), count)]
+        return np.concatenate([of_segments(self.tables(np.array(block)), segment, fraction) for block in blocks])
 
 
 def played_extremes(program: FrameProgram) -> tuple[int, int, int]:
     """Return bounds of the codes of all frames before the clamp, and of the step of a tick, with what shaping adds."""
-    least, most, steepest = program.extremes
+    return _shaped(program, program.extremes)
+
+
+def played_bounds(program: FrameProgram) -> tuple[int, int, int]:
+    """Return what ``played_extremes`` do not exceed, in a fraction of the time."""
+    return _shaped(program, program.bounds)
+
+
+def _shaped(program: FrameProgram, extremes: tuple[int, int, int]) -> tuple[int, int, int]:
+    least, most, steepest = extremes
     shaping = program.output.shaping
     room = ceil(shaping.excess - 0.5)
     return least - room, most + room, steepest + shaping.step_excess

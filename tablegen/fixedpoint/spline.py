@@ -56,17 +56,17 @@ def of_segments(table: Ints, segment: Ints, fraction: Ints) -> Ints:
     Parameters
     ----------
     table
-        Coefficients of the B-spline, shape (2^P,).
+        Coefficients of one B-spline or of several, shape (..., 2^P).
     segment, fraction
-        Of each phase, of one shape.
+        Of each phase, shape (n,).
 
     Returns
     -------
     Ints
-        Samples, of that shape.
+        Samples, shape (..., n).
     """
-    of_table = coefficients([np.roll(table, -ahead) for ahead in range(WORDS_BEHIND + 1)])
-    return _horner([one[segment] for one in of_table], fraction)
+    of_table = coefficients([np.roll(table, -ahead, axis=-1) for ahead in range(WORDS_BEHIND + 1)])
+    return _horner([one.take(segment, axis=-1) for one in of_table], fraction)
 
 
 def evaluate_segment(words: Sequence[Ints], fraction: Ints) -> Ints:

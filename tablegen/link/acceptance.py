@@ -204,6 +204,9 @@ def _slew(contents: Contents, page: int) -> Finding | None:
 
 def _lines_out_of_range(program: FrameProgram, page: int) -> Finding | None:
     output = program.output
+    least, most, _ = program.bounds
+    if output.code_min <= least and most <= output.code_max:
+        return None
     for line in range(program.lines):
         codes = program.unclamped(line)
         if int(np.min(codes)) < output.code_min or int(np.max(codes)) > output.code_max:
@@ -214,6 +217,8 @@ def _lines_out_of_range(program: FrameProgram, page: int) -> Finding | None:
 def _steep_lines(program: FrameProgram, page: int) -> Finding | None:
     output = program.output
     max_step = output.max_step - output.shaping.step_excess
+    if program.bounds[2] <= max_step:  # a clamp makes no step longer
+        return None
     first = codes = output.clamp(program.unclamped(0)[0])
     for line in range(program.lines):
         after = output.clamp(program.unclamped(line + 1)[0]) if line + 1 < program.lines else first
@@ -240,15 +245,15 @@ def _jump(contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | N
 def _line_starts(axis: AxisProgram, page: int) -> Ints:
     """Return the codes from which a program may be replaced, or codes that bound them."""
     if isinstance(axis, FrameProgram):
-        return np.array([_first_code(axis, line) for line in range(axis.lines)], dtype=np.int64)
+        return axis.output.clamp(axis.starts)
     # A spline stays between its words, as lines do.
     return axis.output.code(axis.resting(axis.words) if page == 2 else axis.samples(_FIRST))
 
 
-def _first_code(axis: AxisProgram, line: int = 0) -> int:
-    """Return the code of the first tick of a line."""
+def _first_code(axis: AxisProgram) -> int:
+    """Return the code of the first tick."""
     if isinstance(axis, FrameProgram):
-        return int(axis.output.clamp(axis.at(line, _FIRST))[0])
+        return int(axis.output.clamp(axis.at(0, _FIRST))[0])
     return int(axis.output.code(axis.samples(_FIRST))[0])
 
 

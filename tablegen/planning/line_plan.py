@@ -18,18 +18,18 @@ from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Floats, Ints
+from tablegen.planning.axis_request import AxisRequest
 from tablegen.planning.axis_table import make_table
 from tablegen.planning.clock import clocks_per_tick
 from tablegen.planning.drive import Drive, make_drive
-from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
-from tablegen.planning.harmonic_choice import HarmonicChoice
+from tablegen.planning.feasibility import DEFAULT_HARMONICS
 from tablegen.planning.pixel_errors import PixelErrors, pixel_errors
 from tablegen.planning.pixel_table import passages, with_pixel_table
 from tablegen.planning.settling import settle_lines
 from tablegen.planning.sine_setup import SINE, default_formats, sine_setup, with_motion
 from tablegen.planning.table_choice import TableRequest
 from tablegen.planning.table_maker import steepest_step
-from tablegen.planning.timing import AxisTiming, make_schedule
+from tablegen.planning.timing import make_schedule
 from tablegen.planning.voltages import axis_voltages
 from tablegen.planning.waveforms import make_waveforms
 from tablegen.waveform.series import FourierSeries
@@ -384,14 +384,9 @@ def _line_plan(
     ``beside`` is the table of the other axis, where a limit of instructions has to count with it.
     """
     before = len(problems.entries)
-    timing = AxisTiming.of(setup, axis, schedule)
-    feasible = Feasibility(setup, axis, problems)
-    choice = HarmonicChoice(setup, axis, timing.rate, timing.period, feasible, problems)
-    feasible.check_table(timing.period)
-
-    voltages = axis_voltages(setup, axis, float(timing.rate), problems)
-    straight = choice.for_straight_line(voltages.allowed)
-    drive = make_drive(setup, axis, float(timing.rate), voltages, straight, problems)
+    request = AxisRequest.of(setup, axis, schedule, problems)
+    timing, feasible, choice, straight = request.timing, request.feasible, request.choice, request.harmonics
+    drive = make_drive(setup, axis, float(timing.rate), request.voltages, straight, problems)
     if drive is None or len(problems.entries) > before:
         return None
     harmonics = choice.for_drive(drive, straight)

@@ -92,12 +92,11 @@ class FrameGeometry(Struct, frozen=True):
     rise_s: float
 
     @classmethod
-    def of(cls, setup: Setup, straight: Plan) -> "FrameGeometry":
-        """Return the geometry of a scan whose plan at 0 degrees is known."""
+    def of(cls, setup: Setup, schedule: Schedule, size_nm: tuple[float, float]) -> "FrameGeometry":
+        """Return the geometry of a scan with a schedule, and the sizes of its line and its frame at 0 degrees."""
         coupling, (along_x, along_y) = setup.scanner.coupling, setup.scan.drift_nm_per_s
-        sizes = straight.x.drive.size_nm, straight.y.drive.size_nm
-        rise_s = setup.scan.y.turn / float(straight.schedule.frame_rate)
-        return cls(setup.scan.angle_deg, sizes, coupling.x_per_y, coupling.y_per_x, (along_x, along_y), rise_s)
+        rise_s = setup.scan.y.turn / float(schedule.frame_rate)
+        return cls(setup.scan.angle_deg, size_nm, coupling.x_per_y, coupling.y_per_x, (along_x, along_y), rise_s)
 
     @property
     def shares(self) -> dict[str, tuple[float, float]]:
@@ -211,15 +210,15 @@ def make_turned_plan(setup: Setup, progress: Callable[[str], object] = lambda _:
             problems.entries.extend(rejected.problems)
     problems.stop_if_any()
     progress("planning the scan at 0 degrees")
-    straight = plan_at_0(setup)
+    straight = make_plan(at_0_degrees(setup))
     schedule = straight.schedule
-    geometry = FrameGeometry.of(setup, straight)
+    geometry = FrameGeometry.of(setup, schedule, (straight.x.drive.size_nm, straight.y.drive.size_nm))
     if any(geometry.drift_nm_per_s) and schedule.down.count:
         problems.add(
             setup.scan_file, "drift_nm_per_s", "is followed in frames that go up alone; take timing.frame = 'flyback'"
         )
     shares = geometry.shares
-    tilts = plan_tilts(setup, straight, geometry, problems)
+    tilts = plan_tilts(setup, schedule, straight.x.series.harmonics, geometry, problems)
     problems.stop_if_any()
     axes = {}
     for line in straight.lines:
@@ -297,7 +296,7 @@ def shape_costs(
     ``beside`` is the other axis, which may have wider words of its converter, or no runs. With None it takes nothing.
     """
     programs = {shape: program for shape in shapes if (program := search.program(shape)) is not None}
-    guard, last = _allowed_step(setup, line), (1 << line.program.output.dac_bits) - 1
+    guard, last = allowed_step(setup, line.axis, line.converter), (1 << line.program.output.dac_bits) - 1
     others = [] if beside is None else [beside]
     max_step = min(2 * ceil(search.steepest), last) if guard is None else guard
     return {
@@ -307,30 +306,18 @@ def shape_costs(
 
 
 def plan_tilts(
-    setup: Setup, straight: Plan, geometry: FrameGeometry, problems: Problems
+    setup: Setup, schedule: Schedule, harmonics: int, geometry: FrameGeometry, problems: Problems
 ) -> dict[TiltName, TiltedOutput]:
-    """Plan the outputs beside x and y of a scan whose plan at 0 degrees is known; fewer where ``problems`` grew."""
+    """Plan the outputs beside x and y of a scan whose line has so many harmonics; fewer where ``problems`` grew."""
     planned = {}
     for name, tilt in setup.scan.tilts.items():
         with problems.at(setup.scan_file, name):
             shares = geometry.on_a_plane(tilt.slope_x, tilt.slope_y)
-            harmonics = straight.x.series.harmonics
-            planned[name] = plan_tilt(setup, name, straight.schedule, harmonics, shares, problems)
+            planned[name] = plan_tilt(setup, name, schedule, harmonics, shares, problems)
     return {name: output for name, output in planned.items() if output is not None}
 
 
-def plan_at_0(setup: Setup) -> Plan:
-    """Plan the same scan at 0 degrees, without coupling and drift.
-
-    Raises
-    ------
-    Rejected
-        With every contradiction on both axes.
-    """
-    return make_plan(_at_0_degrees(setup))
-
-
-def _at_0_degrees(setup: Setup) -> Setup:
+def at_0_degrees(setup: Setup) -> Setup:
     """Return the setup without angle, coupling, drift, z, aux, and the clock, of which a slow part takes others.
 
     Tables that a build chooses are not looked for, and nothing is counted: none of them plays.
@@ -482,7 +469,7 @@ def within_range(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram
             (centre - output.code_min) / max(centre - least, 1), (output.code_max - centre) / max(most - centre, 1)
         )
         problems.add(*mixing_key(setup), _what_fits(plan, setup.scan.angle_deg, line, room))
-    allowed = _allowed_step(setup, line)
+    allowed = allowed_step(setup, line.axis, line.converter)
     if allowed is None:
         return program.guarded(min(2 * steepest, (1 << output.dac_bits) - 1))
     if steepest > allowed:
@@ -497,13 +484,13 @@ def within_range(setup: Setup, plan: Plan, line: LinePlan, program: FrameProgram
     return program.guarded(allowed)
 
 
-def _allowed_step(setup: Setup, line: LinePlan) -> int | None:
+def allowed_step(setup: Setup, axis: str, converter: Converter) -> int | None:
     """Return the codes that the amplifier of an axis allows in a tick; None if the scan file does not say."""
-    hardware, last = setup.hardware(line.axis), (1 << line.program.output.dac_bits) - 1
+    hardware = setup.hardware(axis)
     if hardware.amplifier.max_slew_v_per_s is None:
         return None
-    per_tick = hardware.amplifier.max_slew_v_per_s / hardware.dac.update_rate_hz / abs(line.converter.v_per_code)
-    return min(floor(per_tick), last)
+    per_tick = hardware.amplifier.max_slew_v_per_s / hardware.dac.update_rate_hz / abs(converter.v_per_code)
+    return min(floor(per_tick), (1 << converter.bits) - 1)
 
 
 def _what_fits(plan: Plan, angle_deg: float, line: LinePlan, room: float) -> str:

@@ -10,26 +10,28 @@ import numpy as np
 from msgspec import Struct, structs
 
 from tablegen.base.input_errors import Problems, Unphysical
+from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
 from tablegen.config.load import Setup
 from tablegen.device.dual_program import ScanProgram
-from tablegen.fixedpoint.frame_program import FrameProgram
+from tablegen.fixedpoint.frame_program import FrameProgram, played_bounds, played_extremes
 from tablegen.fixedpoint.frame_words import FrameMove
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.axis_request import ScanRequest
 from tablegen.planning.turned_plan import (
     FrameGeometry,
     TurnedAxis,
     TurnedPlan,
+    allowed_step,
+    at_0_degrees,
     check_reach,
-    plan_at_0,
     plan_tilts,
-    within_range,
 )
 from tablegen.waveform.series import FourierSeries
 
 _ROUNDS = 1
 _SAMPLES = 128  # of a line
+_SAMPLES_OF_ROUNDS = 64  # before the last play, which gives the error
 _MOST_LINES = 24  # of a frame that are played
 _LEAST_SHARE = 0.02  # of the longer motion: a part that is shorter is not made longer
 
@@ -52,25 +54,27 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     """Scale the program that plays to another scan; None where it has other lines or windows, or leaves a limit.
 
     Nothing is learnt for z and aux, so those of the preview are exact; there is no preview where one begins or ends.
+    Of the scan at 0 degrees only schedule and voltages are needed: what else of it is refused, the plan refuses.
 
     Raises
     ------
     Rejected
-        If the scan is refused at 0 degrees.
+        If the schedule or the voltages of the scan at 0 degrees are refused.
     """
-    straight = plan_at_0(setup)
-    old, new = plan.schedule, straight.schedule
+    request = ScanRequest.of(at_0_degrees(setup))
+    old, new = plan.schedule, request.schedule
     same_keys = ("ticks", "lines", "turn_tick", "forward", "backward", "up", "down")
-    if any(getattr(old, key) != getattr(new, key) for key in same_keys):
+    if setup.scan.x.motion != "line" or any(getattr(old, key) != getattr(new, key) for key in same_keys):
         return None
-    geometry, problems = FrameGeometry.of(setup, straight), Problems()
-    shares, tilts = geometry.shares, plan_tilts(setup, straight, geometry, problems)
+    sizes = request.x.voltages.size_nm, request.y.voltages.size_nm
+    geometry, problems = FrameGeometry.of(setup, new, sizes), Problems()
+    shares, tilts = geometry.shares, plan_tilts(setup, new, request.x.harmonics, geometry, problems)
     if problems.entries or tilts.keys() != {tilt.name for tilt in plan.tilts}:
         return None
     programs, moves, errors = [], [], []
-    for axis, line in zip(plan.axes, straight.lines, strict=True):
+    for axis, voltages in zip(plan.axes, (request.x.voltages, request.y.voltages), strict=True):
         try:
-            program, move, error = _scaled(setup, plan, straight, axis, line, *shares[axis.axis])
+            program, move, error = _scaled(setup, axis, voltages.driver.share(voltages.v_offset), *shares[axis.axis])
         except (Unphysical, OverflowError):
             return None
         if program is None:
@@ -84,27 +88,41 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
 
 
 def _scaled(
-    setup: Setup, plan: TurnedPlan, straight: Plan, axis: TurnedAxis, line: LinePlan, fast_nm: float, slow_nm: float
+    setup: Setup, axis: TurnedAxis, middle: float, fast_nm: float, slow_nm: float
 ) -> tuple[FrameProgram | None, FrameMove, float]:
-    """Return the program of an axis with its parts scaled, None if it leaves a limit; its words, and its error in %."""
-    motion = replace(
-        axis.motion, fast_nm=fast_nm, slow_nm=slow_nm, centre=line.drive.driver.share(line.drive.v_offset), layer=None
-    )
+    """Return the program of an axis with its parts scaled, None if it leaves a limit; its words, and its error in %.
+
+    ``middle`` is the offset of the new place, of v_max.
+    """
+    if min(abs(line.centre - middle) for line in axis.known.operator.lines) > CENTRE_REACH:
+        raise Unphysical("no trace of the operator is near this offset")
+    motion = replace(axis.motion, fast_nm=fast_nm, slow_nm=slow_nm, centre=middle, layer=None)
     centre = axis.drive.slow.a0 + motion.centre - axis.motion.centre
     longest = max(motion.longest_nm, axis.motion.longest_nm)
     fast = _ratio(fast_nm, axis.motion.fast_nm, _LEAST_SHARE * longest)
     slow = _ratio(slow_nm, axis.motion.slow_nm, _LEAST_SHARE * longest)
     for number in range(_ROUNDS + 1):
         drive = _drive(axis.drive, fast, slow, centre)
-        moved_fast, moved_slow, error_nm = _played(axis, motion, drive)
+        samples = _SAMPLES_OF_ROUNDS if number < _ROUNDS else _SAMPLES
+        moved_fast, moved_slow, error_nm = _played(axis, motion, drive, samples)
         if number < _ROUNDS:
             fast *= fast_nm / moved_fast if abs(moved_fast) > _LEAST_SHARE * abs(fast_nm) else 1.0
             slow *= slow_nm / moved_slow if abs(moved_slow) > _LEAST_SHARE * abs(slow_nm) else 1.0
     check_reach(axis.known, drive, motion.lines)
     move = FrameMove.of(axis.program, fast, slow, axis.converter.code(axis.known.driver.volts(centre)))
-    problems = Problems()
-    program = within_range(setup, straight, line, move.program(axis.program), problems)
-    return None if problems.entries else program, move, 100.0 * error_nm / motion.longest_nm
+    return _guarded(setup, axis, move.program(axis.program)), move, 100.0 * error_nm / motion.longest_nm
+
+
+def _guarded(setup: Setup, axis: TurnedAxis, program: FrameProgram) -> FrameProgram | None:
+    """Return the program with its slew guard; None if it leaves the range or the slew rate.
+
+    Where the scan file names no slew rate, the guard of the program that plays stays, unless a step is longer.
+    """
+    output, allowed = program.output, allowed_step(setup, axis.axis, axis.converter)
+    for least, most, steepest in (extremes(program) for extremes in (played_bounds, played_extremes)):
+        if output.code_min <= least and most <= output.code_max and (allowed is None or steepest <= allowed):
+            return program.guarded(max(output.max_step, steepest) if allowed is None else allowed)
+    return None
 
 
 def _ratio(new_nm: float, old_nm: float, least_nm: float) -> float:
@@ -127,16 +145,16 @@ def _drive(drive: FrameDrive, fast: float, slow: float, centre: float) -> FrameD
     return replace(drive, slow=series, gains=fast * drive.gains)
 
 
-def _played(axis: TurnedAxis, motion: FrameMotion, drive: FrameDrive) -> tuple[float, float, float]:
+def _played(axis: TurnedAxis, motion: FrameMotion, drive: FrameDrive, samples: int) -> tuple[float, float, float]:
     """Return the motions of the line and of the frame in nm, and the largest distance from the wanted position.
 
-    Of a long frame only some lines are played.
+    Of a long frame only some lines are played, at so many samples of each.
     """
     lines = np.arange(0, motion.lines, max(motion.lines // _MOST_LINES, 1))
-    t = np.arange(_SAMPLES) / _SAMPLES
+    t = np.arange(samples) / samples
     rows = drive.at(motion.lines, t)[lines]
     u = np.clip(rows.ravel(), 0.0, 1.0)
-    time_s = np.arange(len(u) + 1) / (_SAMPLES * motion.line_rate_hz)
+    time_s = np.arange(len(u) + 1) / (samples * motion.line_rate_hz)
     position = axis.piezo.position(time_s, np.append(u, u[0]))[:-1].reshape(rows.shape)
     at = np.ix_(np.flatnonzero(motion.imaged[lines]), np.flatnonzero(motion.inside(t)))
     along = np.broadcast_to(motion.fast(t) - 0.5, rows.shape)[at].ravel()

@@ -47,6 +47,20 @@ def test_a_share_of_the_field_is_that_of_the_rate() -> None:
     assert everywhere.at_rate(1e8) is everywhere
 
 
+@pytest.mark.parametrize("straight", [False, True])
+@pytest.mark.parametrize("rate_share", [0.0, 0.1])
+def test_many_rows_have_every_bit_of_each(straight: bool, rate_share: float) -> None:
+    """Strokes and centres that come twice too; the negative control: at another rate they are others."""
+    random = np.random.default_rng(3)
+    points = np.column_stack([POINTS, random.uniform(0.0, 3.0, len(POINTS))])
+    field = through(points, random.normal(size=(4, 3)), Lengths(0.8, 0.7, 1e-8, rate_share), straight)
+    strokes, centres = np.tile(random.uniform(0.0, 1.0, (2, 25)), 2)
+    rows = field.at_rate(20.0).at_many(strokes, centres)
+    each = [field.at_rate(20.0).at(*one) for one in zip(strokes.tolist(), centres.tolist(), strict=True)]
+    assert rows.tobytes() == np.array(each).tobytes()
+    assert np.array_equal(field.at_rate(200.0).at_many(strokes, centres), rows) == (rate_share == 0.0)
+
+
 def test_far_from_all_points_a_field_is_nothing() -> None:
     assert through(POINTS, np.ones((4, 1)), Lengths(0.05, 0.05, 1e-6)).at(5.0, 5.0)[0] == pytest.approx(0.0, abs=1e-12)
 

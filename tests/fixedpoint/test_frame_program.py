@@ -3,6 +3,7 @@
 from fractions import Fraction
 from itertools import pairwise
 from math import floor
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -125,6 +126,27 @@ def test_mixed_words_saturate_and_codes_are_those_of_the_formula(frame: FramePro
             total = gains[line] * sample + slow[line] + k * ramps[line]
             assert -(1 << (SUM_BITS - 1)) <= total < 1 << (SUM_BITS - 1)
             assert codes[line, k] == min(max((total + (1 << 19)) >> 20, 0), 65535)
+
+
+@settings(max_examples=100)
+@given(frame_programs(), st.sampled_from([1, 100, 1 << 15]))
+def test_bounds_hold_the_extremes(frame: FrameProgram, block: int) -> None:
+    """Of any words, in blocks of lines as well as line by line."""
+    codes = np.concatenate([frame.unclamped(line) for line in range(frame.lines)])
+    steps = np.abs(codes.ravel() - np.roll(codes.ravel(), 1))
+    with patch("tablegen.fixedpoint.frame_program._BLOCK", block):
+        assert frame.extremes == (np.min(codes), np.max(codes), np.max(steps))
+        assert np.array_equal(frame.unclamped(0, frame.lines), codes)
+        (least, most, steepest), (low, high, step) = frame.extremes, frame.bounds
+    assert np.array_equal(frame.starts, codes[:, 0])
+    assert low <= least <= most <= high
+    assert steepest <= step
+
+
+def test_bounds_of_equal_words_are_the_extremes() -> None:
+    """The negative control: bounds that are narrower by a code do not hold them."""
+    still = FrameProgram.straight(program([700] * 8, 32), 4)
+    assert still.bounds[:2] == still.extremes[:2]
 
 
 def test_mixed_words_reach_both_ends() -> None:

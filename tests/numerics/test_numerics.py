@@ -1,6 +1,7 @@
 """Reproducible arithmetic against mpmath: accuracy, exact zeros, symmetry."""
 
 from decimal import Context, Decimal
+from unittest.mock import patch
 
 import mpmath as mp
 import numpy as np
@@ -9,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tablegen.numerics.arrays import tree_sum, tree_sum_down
-from tablegen.numerics.elementary import exp, log10
+from tablegen.numerics.elementary import _step_parts, exp, exps, log10
 from tablegen.numerics.fourier import filtered
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sinc, sine, sine_and_cosine, sine_and_cosine_of, spherical_bessel_1
@@ -81,6 +82,27 @@ def test_an_exp_that_is_no_double_is_refused() -> None:
     for x in (709.782712893385, 711.0, 1e300):
         with pytest.raises(OverflowError):
             exp(x)
+
+
+@given(st.lists(st.floats(-760.0, 709.0), max_size=20))
+def test_many_numbers_have_the_exp_of_each(x: list[float]) -> None:
+    assert exps(np.array(x)).tobytes() == np.array([exp(one) for one in x]).tobytes()
+
+
+def test_pairs_decide_nearly_all_numbers() -> None:
+    """Those of covariances, with every bit; the negative control: powers that are no pairs have wrong ones."""
+    x = np.append(-np.random.default_rng(5).exponential(2.0, 3999), 0.0).reshape(40, 100)
+    exact = np.array([exp(one) for one in x.ravel().tolist()]).reshape(x.shape)
+    with patch("tablegen.numerics.elementary.exp") as by_integers:
+        assert np.array_equal(exps(x), exact)
+    assert by_integers.call_count == 0
+    first, second, third, high, low = _step_parts()
+    with patch("tablegen.numerics.elementary._step_parts", return_value=(first, second, third, high, 0.0 * low)):
+        assert np.mean(exps(x) != exact) > 0.05
+    with patch("tablegen.numerics.elementary._PAIR_ERROR", 1.0):  # none is decided
+        assert np.array_equal(exps(x), exact)
+    with pytest.raises(OverflowError):
+        exps(np.array([1.0, 720.0]))
 
 
 @given(st.floats(1e-300, 1e300))

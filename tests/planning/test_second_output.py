@@ -54,7 +54,9 @@ def operators(tmp_path_factory: pytest.TempPathFactory) -> tuple[Setup, Plan]:
 def outputs(setup: Setup, straight: Plan) -> dict[str, TiltedOutput]:
     """Both outputs of a scan alone, without what is learnt on x and y."""
     problems = Problems()
-    planned = plan_tilts(setup, straight, FrameGeometry.of(setup, straight), problems)
+    sizes = straight.x.drive.size_nm, straight.y.drive.size_nm
+    geometry = FrameGeometry.of(setup, straight.schedule, sizes)
+    planned = plan_tilts(setup, straight.schedule, straight.x.series.harmonics, geometry, problems)
     problems.stop_if_any()
     return {str(name): tilt for name, tilt in planned.items()}
 

@@ -52,7 +52,8 @@ def planned(path: Path, name: TiltName = "z") -> TiltedOutput:
     setup, problems = load(path), Problems()
     without = {"angle_deg": 0.0, "z": None, "aux": None}
     straight = make_plan(replace(setup, scan=replace(setup.scan, **without)))
-    tilts = plan_tilts(setup, straight, FrameGeometry.of(setup, straight), problems)
+    geometry = FrameGeometry.of(setup, straight.schedule, (straight.x.drive.size_nm, straight.y.drive.size_nm))
+    tilts = plan_tilts(setup, straight.schedule, straight.x.series.harmonics, geometry, problems)
     problems.stop_if_any()
     return tilts[name]
 

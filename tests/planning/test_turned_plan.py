@@ -182,6 +182,9 @@ def test_the_slew_guard_does_not_act(tmp_path: Path) -> None:
         codes = axis.program.unclamped(0, axis.program.lines).ravel()
         steps = np.abs(codes - np.roll(codes, 1))
         assert (least, most, steepest) == (np.min(codes), np.max(codes), np.max(steps))
+        low, high, step = axis.program.bounds  # narrow enough to decide without the codes
+        assert least - low + high - most < 0.02 * (most - least)
+        assert steepest <= step < 1.05 * steepest + 3
 
 
 def test_other_plans_refuse_what_mixes_motions(tmp_path: Path) -> None:

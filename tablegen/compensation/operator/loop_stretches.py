@@ -74,7 +74,7 @@ def _positions(operator: Operator, stretches: Sequence[LoopStretch]) -> tuple[Fl
     first, last = (here if rising else other)[:, -2, None], (here if rising else other)[:, -1, None]
     extent = last - first
     here, other = (here - first) / extent, (other - first) / extent
-    rows = np.stack([operator.residual.at(one.high - one.low, 0.5 * (one.low + one.high)) for one in stretches])
+    rows = operator.residual.at_many(high - low, 0.5 * (low + high))
     half = rows.shape[1] // 2
     mine, others = (rows[:, :half], rows[:, half:]) if rising else (rows[:, half:], rows[:, :half])
     if np.any(rows):

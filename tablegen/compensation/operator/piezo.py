@@ -49,6 +49,10 @@ class DepartingField(Field):
         departure = near @ self.departures / np.sqrt(np.sum(near * near))
         return np.asarray(super().at(stroke, centre) + departure, dtype=np.float64)
 
+    def at_many(self, strokes: Floats, centres: Floats) -> Floats:
+        """Return ``at`` of many strokes and centres, shape (n, columns)."""
+        return np.stack([self.at(*one) for one in zip(strokes.tolist(), centres.tolist(), strict=True)])
+
 
 @dataclass(frozen=True, eq=False)
 class OperatorPiezo:
