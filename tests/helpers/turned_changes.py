@@ -22,7 +22,7 @@ from tablegen.api.turned import build_turned
 from tablegen.device.commit_mode import CommitMode
 from tablegen.device.dual_program import ScanProgram
 from tablegen.fixedpoint.frame_program import FrameProgram, Knots
-from tablegen.fixedpoint.frame_words import scaled_frame
+from tablegen.fixedpoint.frame_words import FrameMove
 from tablegen.numerics.arrays import Bools, Ints
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import FLAGS
@@ -189,7 +189,7 @@ class RandomHost:
         """An axis of a plan with other shares, mostly where its limits let it be, and a guard for its steps."""
         assert isinstance(axis, FrameProgram)
         rng, output = self.rng, axis.output
-        made = scaled_frame(axis, fast, slow, 0.0)
+        made = FrameMove.of(axis, fast, slow, 0.0).program(axis)
         sums, half = frame_sums(made), 1 << (output.gain_q - 1)
         low = output.code_min - (int(np.min(sums)) >> output.gain_q)
         high = output.code_max - (int(np.max(sums)) >> output.gain_q) - 1
