@@ -7,6 +7,7 @@ benchmarks/tables.py --costs`` measures them, ``python benchmarks/slow_costs.py`
 package, with the versions of the compilers and a digest of the C.
 """
 
+import argparse
 import hashlib
 import inspect
 import json
@@ -56,6 +57,7 @@ class Scan(NamedTuple):
     without_runs: bool = False
     fast: bool = False  # so fast that every run is refused
     block: int = 0  # ticks of a block of a run, where they are not those of the program
+    cubic: bool = True
 
 
 def every_run() -> list[MeasuredRun]:
@@ -90,6 +92,12 @@ def short_line(core: str, run: MeasuredRun) -> float:
     """Count a sample of a short line, of another table without a second one: what the counts have to give too."""
     scan = Scan(words=CHECKED_WORDS, ticks=SHORT_TICKS, second=False, coded=run.coded)
     return round(_sample(_machine(core, run), run, scan), 1)
+
+
+def linear_count(core: str) -> float:
+    """Count a sample of an axis with linear tables in runs, which no build has: see docs/tables.md."""
+    run = MeasuredRun(16, 16, False)
+    return round(_sample(_machine(core, run), run, Scan(cubic=False)), 1)
 
 
 def expected_short_line(count: SampleCount, lines: LineCost) -> float:
@@ -184,7 +192,7 @@ def _start(machine: Processor, run: MeasuredRun, scan: Scan) -> None:
     words = {
         "line_ticks": scan.ticks,
         "frame_lines": LINES,
-        "index_bits": (scan.words.bit_length() - 1) | CUBIC,
+        "index_bits": (scan.words.bit_length() - 1) | (CUBIC if scan.cubic else 0),
         "slow_index_bits": SLOW_WORDS.bit_length() - 1,
         "word_bits": BITS,
         "code_bits": code_bits,
@@ -214,5 +222,15 @@ def _with_first_again(values: Floats) -> np.ndarray[Any, np.dtype[Any]]:
     return np.round(np.append(values, values[:WORDS_BEHIND])).astype("<i2")
 
 
+def main() -> None:
+    """Write, or print what linear tables take."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--linear", action="store_true", help="print what linear tables take, and write nothing")
+    if parser.parse_args().linear:
+        print(*(f"{core}: {linear_count(core)}" for core in PROCESSORS), sep="\n")
+    else:
+        write()
+
+
 if __name__ == "__main__":
-    write()
+    main()

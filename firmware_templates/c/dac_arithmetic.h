@@ -10,7 +10,10 @@
 #define DAC_GUARD(bank) ((bank)->guard)
 #endif
 
-#if !DAC_LONG_MULTIPLY
+/* Whether any run counts with 32 bits: without DAC_LONG_MULTIPLY all of them, else those of lines with a ramp. */
+#define DAC_SHORT_SUMS (!DAC_LONG_MULTIPLY || (DAC_SLOW_PART && DAC_TABLE_STORAGE_BITS == 16))
+
+#if DAC_SHORT_SUMS
 /* Runs with 32 bits scale gain and offset by 2^DAC_UP, as if all samples had as many bits as the storage allows, for
  * words of 16 bits only if they are shaped. Of wider words they keep the DAC_FINE lower bits of a product apart. */
 #if DAC_TABLE_STORAGE_BITS == 16

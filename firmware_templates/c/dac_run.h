@@ -75,6 +75,14 @@ DAC_CODE_ATTR static inline int32_t dac_track_next(dac_track *track)
 
 #endif
 
+/* The stretch of a waveform that is played: a position, cut to 64 bits and rounded up, the step of a tick, and the
+ * place of the first code. */
+typedef struct {
+    uint64_t at, step;
+    dac_output *out;
+    uint32_t ticks;
+} dac_stretch;
+
 /* Returns the ticks of the next block, which one check covers. */
 DAC_CODE_ATTR static inline uint32_t dac_block_of(uint32_t ticks)
 {
@@ -89,7 +97,7 @@ static inline void dac_set_window(dac_bank_axis *bank, uint8_t bits)
     bank->run_room = bank->code_max - bank->code_min + 1 - (INT32_C(1) << bits);
 }
 
-#if DAC_SLOW_PART && !DAC_LONG_MULTIPLY
+#if DAC_SLOW_PART && DAC_SHORT_SUMS
 /* Returns the spread of samples on a line with a ramp, of a gain as runs scale it; see dac_short.h. */
 DAC_CODE_ATTR static inline uint8_t dac_ramp_spread(uint32_t gain)
 {

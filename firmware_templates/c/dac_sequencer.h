@@ -306,7 +306,7 @@ typedef struct {
     uint8_t order, zero, remainder_bits;
 #endif
 #if DAC_SLOW_PART
-    uint8_t bits;
+    uint8_t bits, segment_ticks; /* of a word; most ticks between two words that one check covers, 0: no such runs */
 #endif
     const dac_word *table;
     uint32_t length;            /* words of the table, without the one behind the last */

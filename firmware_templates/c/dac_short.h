@@ -4,12 +4,6 @@
 
 #include "dac_run.h"
 
-#if !DAC_LONG_MULTIPLY
-
-#define DAC_SAMPLE_BITS 20 /* of 16 and 4 guard bits */
-#define DAC_ABOVE (32 - (DAC_SAMPLE_BITS + 1)) /* where the sum of an interpolation has the LSB of the sample */
-#define DAC_BELOW 8 /* bits of a value below those that a remainder has */
-
 /* A Cortex-M0 adds and compares with all of its registers, and does everything else with the lower eight: variables
  * that are only added or compared go to the upper ones, and the step is read from memory for every sample. */
 #if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__) && !defined(__OPTIMIZE_SIZE__)
@@ -27,6 +21,12 @@
 #define DAC_FEW_REGISTERS 0 /* 1 by a test of what it chooses */
 #endif
 #endif
+
+#if !DAC_LONG_MULTIPLY
+
+#define DAC_SAMPLE_BITS 20 /* of 16 and 4 guard bits */
+#define DAC_ABOVE (32 - (DAC_SAMPLE_BITS + 1)) /* where the sum of an interpolation has the LSB of the sample */
+#define DAC_BELOW 8 /* bits of a value below those that a remainder has */
 
 /* The fast path of dac_axis.c with 32 bits. Codes that are in the window differ from `base` so little that 32 bits hold
  * them with all their fraction bits; what matters is that a code outside is not taken for one inside, since 32 bits
@@ -62,14 +62,6 @@ typedef bool (*dac_feeder)(dac_axis *axis, const dac_bank_axis *bank, const uint
 #else
 #define DAC_SHORT_BITS(bank, axis) (36u - (axis)->bits)
 #endif
-
-/* The stretch of a waveform that is played: a position, cut to 64 bits and rounded up, the step of a tick, and the
- * place of the first code. */
-typedef struct {
-    uint64_t at, step;
-    dac_output *out;
-    uint32_t ticks;
-} dac_stretch;
 
 /* How a run is played. Callers pass constants, so that the compiler makes a loop of its own for each of them. */
 typedef struct {

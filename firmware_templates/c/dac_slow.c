@@ -6,6 +6,16 @@
 
 #if DAC_SLOW_PART
 
+#if DAC_TABLE_STORAGE_BITS == 16 && !defined(__OPTIMIZE_SIZE__) /* what is small has the other loops only */
+#define SEGMENT_RUNS 1
+#else
+#define SEGMENT_RUNS 0
+#endif
+#if DAC_SPLINE
+#define CUBIC(bank) ((bank)->cubic != 0)
+#else
+#define CUBIC(bank) false
+#endif
 #if DAC_SHAPING
 #define SHAPED(bank) ((bank)->order != 0)
 #else
@@ -109,12 +119,37 @@ DAC_CODE_ATTR static int64_t ramp_of(int64_t distance, uint32_t step)
     return distance < 0 ? -ramp : ramp;
 }
 
+#if SEGMENT_RUNS
+enum { SEGMENT_MOST = 64 };
+
+/* Returns how many ticks play_segments() covers with one check on a line: 0 if it does not play the line, else 8 or
+ * more. It plays straight lines between words that are 8 ticks apart or more, not shaped, in a window that 32 bits
+ * hold; the ramps of these ticks add 2^30 at most. */
+DAC_CODE_ATTR static uint8_t segment_ticks(const dac_bank_axis *bank, int64_t ramp)
+{
+    const uint32_t step = bank->step.high;
+
+    if (CUBIC(bank) || SHAPED(bank) || step >> 12 != 0 || bank->gain_q + bank->run_bits > 31
+        || ramp > INT64_C(1) << 24)
+        return 0;
+    const uint32_t parts = 4 * step / bank->length; /* 2^17 / period */
+    return (uint8_t)(parts < 9 ? 0 : parts - 1 < SEGMENT_MOST ? parts - 1 : SEGMENT_MOST);
+}
+#endif
+
 /* Sets what runs of the line need; see dac_program.c and dac_short.h. */
 DAC_CODE_ATTR static void allow_runs(dac_bank_axis *bank)
 {
     const int64_t ramp = bank->ramp < 0 ? -bank->ramp : bank->ramp;
 
     bank->run_most = bank->run_entry == 0 || ramp <= bank->ramp_most ? bank->line_most : 0;
+#if SEGMENT_RUNS
+    bank->segment_ticks = segment_ticks(bank, ramp);
+#if DAC_LONG_MULTIPLY
+    if (bank->segment_ticks != 0)
+        bank->run_spread = dac_ramp_spread((uint32_t)(bank->gain < 0 ? -bank->gain : bank->gain));
+#endif
+#endif
 #if DAC_LONG_MULTIPLY
     if (bank->line_most == 0 || SHAPED(bank)) /* shaped runs take gain, offset and ramp as they are */
         return;
@@ -171,6 +206,139 @@ DAC_CODE_ATTR int32_t dac_slow_code(const dac_axis *axis, const dac_bank_axis *b
 {
     return (int32_t)(((int64_t)bank->gain * sample + bank->offset + axis->rise) >> bank->gain_q); /* 28 bits or fewer */
 }
+
+#if SEGMENT_RUNS
+/* The fast path of straight lines that are not shaped, with a ramp: from word to word of the table. Between two words
+ * samples only rise or only fall, as offsets do on the whole line. So the value of a tick, gain * sample + offset, lies
+ * between the least and the greatest of four sums: of the product of the first or the last sample, and the first or the
+ * last offset. If the codes of all four are in the window of dac_axis.c, those between are, and nothing is checked
+ * tick by tick. Otherwise no more than a block is tried, and then the loops below.
+ *
+ * Why 32 bits of a value are enough. Its window has 31 at most. Let s0 be the last sample before, whose value is in the
+ * window, or at the start of a run the first one, which is compared with 64 bits. The first and the last sample are
+ * within 2^run_spread of it, so with the first offset their values differ from that of s0 by 2^30 of the samples and
+ * less than 2^30 of a ramp (dac_short.h): their lower 32 bits are below 2^31 only if they are in 0..2^31. From there
+ * the ramps to the last offset move them by 2^30 at most.
+ *
+ * Why 32 bits of a position are enough. They have the 15 bits of the fraction and 17 below; the position is cut and
+ * rounded up at the first of these ticks, and so is the step. After t of them it is less than t + 2 units of 2^-17 of a
+ * fraction above the exact one, with what 64 bits are above it. The next fraction is 1 / period away or more, which
+ * is as many units as segment_ticks() counts. So the last tick before the next word is found exactly too. */
+
+/* Two neighbouring words: what a sample grows by in a fraction, and the first one with the half of the rounding. */
+typedef struct {
+    uint32_t slope, low;
+} dac_line;
+
+enum { BELOW_SAMPLE = 11 }; /* bits of the sum: 15 of a fraction, less 4 guard bits */
+
+DAC_CODE_ATTR static inline dac_line line_of(const dac_word *table, uint64_t at)
+{
+    DAC_NEIGHBOURS(table, (uint32_t)(at >> 47), here, there);
+    const dac_line line = {
+        (uint32_t)(there - here),
+        ((uint32_t)here << 15) + (UINT32_C(1) << (BELOW_SAMPLE - 1)),
+    };
+    return line;
+}
+
+DAC_CODE_ATTR static inline uint32_t place_of(uint64_t at)
+{
+    return (uint32_t)(at >> 15) + 1;
+}
+
+DAC_CODE_ATTR static inline uint32_t sample_of(dac_line line, uint32_t place)
+{
+    return (uint32_t)((int32_t)(line.slope * (place >> 17) + line.low) >> BELOW_SAMPLE);
+}
+
+/* The ticks of a segment are counted with a division, and position and step have 64 bits: processors that have no
+ * instructions for these divide once a run, and split the product, whose parts have 32 bits within a segment. */
+#if DAC_LONG_MULTIPLY || defined(__riscv_mul)
+#define WHOLE_SEGMENT(step) 0
+DAC_CODE_ATTR static inline uint32_t ticks_within(uint32_t place, uint32_t step, uint32_t whole)
+{
+    (void)whole;
+    return (UINT32_MAX - place) / step + 1;
+}
+
+DAC_CODE_ATTR static inline uint64_t way_of(uint64_t step, uint32_t ticks)
+{
+    return step * ticks;
+}
+#else
+#define WHOLE_SEGMENT(step) (UINT32_MAX / (step))
+DAC_CODE_ATTR static inline uint32_t ticks_within(uint32_t place, uint32_t step, uint32_t whole)
+{
+    if (place >= step) /* not the first tick of the segment */
+        return (UINT32_MAX - place) / step + 1;
+    return whole + (place <= UINT32_MAX - whole * step ? 1u : 0u);
+}
+
+DAC_CODE_ATTR static inline uint64_t way_of(uint64_t step, uint32_t ticks)
+{
+    const uint32_t upper = (uint32_t)(step >> 16) * ticks, lower = (uint32_t)(step & 0xffffu) * ticks;
+    return ((uint64_t)upper << 16) + lower;
+}
+#endif
+
+DAC_NOINLINE uint32_t play_segments(dac_axis *axis, const dac_bank_axis *bank, dac_stretch s)
+{
+    const dac_word *const table = bank->table;
+    uint32_t step = (uint32_t)(s.step >> 15) + 1, ramp = (uint32_t)bank->ramp;
+    const uint32_t spread = UINT32_C(1) << bank->run_spread;
+    const uint32_t gain = (uint32_t)bank->gain, half = (uint32_t)bank->run_half;
+    const uint32_t whole = WHOLE_SEGMENT(step);
+    const unsigned below = bank->gain_q, window = below + bank->run_bits;
+    const int64_t offset = bank->offset + axis->rise;
+    uint32_t sample = sample_of(line_of(table, s.at), place_of(s.at)); /* the last one before */
+    const int32_t unrounded = (int32_t)(((int64_t)bank->gain * (int32_t)sample + offset) >> below);
+    uint32_t code = (uint32_t)axis->code, rest = (uint32_t)offset, left = s.ticks, most = bank->segment_ticks;
+    uint64_t at = s.at;
+    dac_output *out = s.out;
+
+    if (((uint32_t)unrounded - code + half) >> bank->run_bits != 0)
+        return 0;
+    while (left != 0) {
+        const dac_line line = line_of(table, at);
+        uint32_t place = place_of(at);
+        const uint32_t within = ticks_within(place, step, whole), asked = left < most ? left : most;
+        const uint32_t ticks = within < asked ? within : asked, way = ticks - 1, rise = way * ramp;
+        const uint32_t first = sample_of(line, place), last = sample_of(line, place + way * step);
+        uint32_t base = code - half;
+        uint32_t value = rest - (base << below); /* of a tick, without its sample */
+        const uint32_t from = gain * first + value, to = gain * last + value;
+        const dac_output *stop = out + ticks * DAC_STRIDE;
+
+        if ((from | to | (from + rise) | (to + rise)) >> window != 0
+            || ((first - sample + spread) | (last - sample + spread)) > 2 * spread - 1
+            || !dac_has_room(bank, (int32_t)base)) {
+            if (ticks <= bank->run_block)
+                break;
+            most = bank->run_block;
+            continue;
+        }
+        do {
+            DAC_HIGH_REGISTER(base);
+            DAC_HIGH_REGISTER(ramp);
+            DAC_HIGH_REGISTER(step);
+            DAC_HIGH_REGISTER(stop);
+            code = ((gain * sample_of(line, place) + value) >> below) + base;
+            value += ramp;
+            place += step;
+            *out = (dac_output)code;
+            out += DAC_STRIDE;
+            DAC_HIDE_FROM_OPTIMIZER(out);
+        } while (out != stop);
+        sample = last;
+        rest += rise + ramp;
+        at += way_of(s.step, ticks);
+        left -= ticks;
+    }
+    axis->code = (int32_t)code;
+    return s.ticks - left;
+}
+#endif
 
 #if DAC_LONG_MULTIPLY
 
@@ -291,6 +459,14 @@ DAC_NOINLINE void sample_spline(dac_track *track, int32_t *sample, const int32_t
 DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step,
                                      dac_output *out, uint32_t ticks)
 {
+#if SEGMENT_RUNS
+    if (bank->segment_ticks != 0) {
+        const dac_stretch stretch = {at, step, out, ticks};
+        const uint32_t played = play_segments(axis, bank, stretch);
+        if (played != 0)
+            return played;
+    }
+#endif
     int32_t samples[CHUNK];
     int64_t rise = axis->rise;
     uint32_t done = 0;
@@ -348,6 +524,13 @@ DAC_CODE_ATTR uint32_t dac_slow_play(dac_axis *axis, const dac_bank_axis *bank, 
         return play_spline(axis, bank, at, step, out, ticks);
 #endif
     const dac_stretch stretch = {at, step, out, ticks};
+#if SEGMENT_RUNS
+    if (bank->segment_ticks != 0) {
+        const uint32_t played = play_segments(axis, bank, stretch);
+        if (played != 0)
+            return played;
+    }
+#endif
     const dac_short_kind kind = {false, false, 0, DAC_SHORT_BITS(bank, axis), NULL, true};
     return dac_play_short(axis, bank, stretch, kind);
 }

@@ -41,6 +41,8 @@ SLOW = ("-DDAC_SLOW_PART=1", "-DDAC_COMMIT_MODES=1")
 OPTIONS: dict[str, tuple[str, ...]] = {
     "plain": (),
     "short": ("-DDAC_LONG_MULTIPLY=0",),
+    "fine": (),
+    "short_fine": ("-DDAC_LONG_MULTIPLY=0",),
     "spline": ("-DDAC_SPLINE=1",),
     "short_spline": ("-DDAC_LONG_MULTIPLY=0", "-DDAC_SPLINE=1"),
     "shaping": ("-DDAC_SHAPING=3",),
@@ -56,12 +58,15 @@ TICKS, LINES = 90, 5
 LONG_TICKS = 700  # of lines with many runs
 LINEAR = (SequencerShape(16, 1, 5, 16, 1, 6, 16), SequencerShape(16, 1, 8, 12, 1, 3, 16))
 CUBIC = (SequencerShape(16, 3, 5, 16, 3, 4, 16), SequencerShape(16, 1, 4, 16, 3, 6, 14))
+FINE = (SequencerShape(24, 1, 5, 16, 1, 6, 16), SequencerShape(24, 1, 4, 12, 1, 3, 16))  # a code for each sample
 WIDE = (SequencerShape(20, 1, 6, 24, 3, 5, 21), SequencerShape(24, 3, 4, 20, 1, 5, 8))
 
 
 def shapes(option: str) -> tuple[SequencerShape, ...]:
     if "wide" in option:
         return WIDE
+    if "fine" in option:
+        return FINE
     return LINEAR + (CUBIC if "spline" in option else ())
 
 
@@ -103,9 +108,9 @@ def library_of(path: Path) -> Library:
 
 
 def compiled(folder: Path, option: str, **how: object) -> Path:
-    bits = 32 if "wide" in option else 16
+    bits, code_bits = (32 if any(name in option for name in names) else 16 for names in (("wide",), ("wide", "fine")))
     more = [*SLOW, *OPTIONS[option]]
-    return compile_library(folder / f"{option}.so", bits, bits, 2, more=more, **how)  # type: ignore[arg-type]
+    return compile_library(folder / f"{option}.so", bits, code_bits, 2, more=more, **how)  # type: ignore[arg-type]
 
 
 def play(library: Library, option: str, seed: int, rounds: int = 40) -> Counter[str]:
@@ -180,16 +185,16 @@ def runtime_with(changes: dict[str, str], folder: Path) -> list[Path]:
     return [folder / name for name in texts]
 
 
-def even_waves(option: str, seed: int) -> ScanProgram:
-    """Long smooth lines with ramps, that no limit and no guard touches."""
+def even_waves(option: str, seed: int, ticks: int = 4000, amplitude: float = 0.6) -> ScanProgram:
+    """Long smooth lines with ramps, that no limit and no guard touches; shorter ones with 6 ticks from word to word."""
     rng = np.random.default_rng(seed)
     shape = shapes(option)[-1 if "spline" in option else 0]
-    schedule = replace(random_schedule(rng, 4000, 1), lines=3, settle_lines=0)
+    schedule = replace(random_schedule(rng, ticks, 1), lines=3, settle_lines=0)
     program = scan_program(rng, shape, schedule, "xy")
 
     def free(axis: FrameProgram, number: int) -> FrameProgram:
         fast, half, length = axis.fast, 1 << (axis.fast.bits - 1), len(axis.fast.words)
-        words = np.floor(0.6 * half * np.sin(2 * np.pi * np.arange(length) / length)).astype(np.int64)
+        words = np.floor(amplitude * half * np.sin(2 * np.pi * np.arange(length) / length)).astype(np.int64)
         slow_bits = min(fast.bits, 21)
         turn = 2 * np.pi * (np.arange(8) / 8 + 0.3)
         slow = replace(
@@ -198,15 +203,22 @@ def even_waves(option: str, seed: int) -> ScanProgram:
             gain_word=(-1 if number else 1) * (1 << (fast.output.dac_bits + fast.output.gain_q - slow_bits - 6)),
             offset_word=1 << (fast.output.dac_bits + fast.output.gain_q - 1),
         )
-        gains = replace(axis.gains, words=np.linspace(20000, 24000, len(axis.gains.words)).astype(np.int64))
+        gain = 1600 if "fine" in option else 20_000  # the larger one would not fit there
+        gains = replace(axis.gains, words=np.linspace(gain, 1.2 * gain, len(axis.gains.words)).astype(np.int64))
         top = (1 << fast.output.dac_bits) - 1
         order = 1 + (seed + number) % 3 if "shaping" in option else 0
         shaping = Shaping(order, 100 if order == 3 else 0)
         output = replace(fast.output, code_min=0, code_max=top, max_step=top // 32, park_code=top // 2, shaping=shaping)
+        if "fine" in option:
+            output = replace(output, gain_word=gain)
         return replace(axis, fast=replace(fast, words=words, output=output), slow=slow, gains=gains)
 
     axes = [free(axis, number) for number, axis in enumerate((program.x, program.y)) if isinstance(axis, FrameProgram)]
     return replace(program, x=axes[0], y=axes[1])
+
+
+LONG_LINE = 12_274  # of which 32 bits hold the place of 10 ticks between two words, and not that of 64
+SHORT_LINES = 200, 0.05  # ticks, and an amplitude by which 16 of them stay in a window
 
 
 def without_ramps(program: ScanProgram) -> ScanProgram:
@@ -246,15 +258,15 @@ def guarded_waves(steep: str, over: int) -> ScanProgram:
     return replace(program, x=guarded(program.x), y=guarded(program.y), schedule=schedule)
 
 
-def jumps() -> ScanProgram:
+def jumps(ticks: int = 256, height: int = 2048) -> ScanProgram:
     """Lines with jumps by which the value of a code grows by 2^32: 32 bits do not see them."""
     program = even_waves("plain", 1)
-    schedule = replace(random_schedule(np.random.default_rng(1), 256, 1), lines=3, settle_lines=0)
+    schedule = replace(random_schedule(np.random.default_rng(1), ticks, 1), lines=3, settle_lines=0)
 
     def jumping(axis: FrameProgram) -> FrameProgram:
-        words = np.where(np.arange(256) % 128 < 70, 0, 2048)
+        words = np.where(np.arange(256) % 128 < 70, 0, height)
         output = replace(axis.output, gain_word=1, max_step=200)
-        fast = replace(axis.fast, words=words, phase=RationalPhase(256), output=output)
+        fast = replace(axis.fast, words=words, phase=RationalPhase(ticks), output=output)
         gains = Knots(np.full(2, -(1 << 17)), 3)
         ratios, second = Knots(np.zeros(2, np.int64), 3), np.zeros(256, np.int64)
         return FrameProgram(fast, 3, gains, ratios, second, replace(axis.slow, gain_word=axis.slow.gain_word // 16))
@@ -268,6 +280,57 @@ def jumps() -> ScanProgram:
 @pytest.mark.parametrize("option", common(("short",), ("plain", "short")))
 def test_jumps_that_32_bits_do_not_see_are_played_one_by_one(option: str, folder: Path) -> None:
     play_fills(library_of(compiled(folder, option)), jumps(), 5000)
+
+
+SLOW_JUMPS = 4096, 2185  # from the first to the last of the 16 ticks between two words
+
+
+def long_segments(option: str, seed: int) -> ScanProgram:
+    """Lines of any words with many ticks from word to word."""
+    rng = np.random.default_rng(seed)
+    bits = int(rng.integers(3, 6))
+    ticks = int(rng.integers(8 << bits, 40 << bits))
+    shape = replace(shapes(option)[0], x_index_bits=bits, y_index_bits=bits)
+    schedule = replace(random_schedule(rng, ticks, 1), lines=3)
+    return scan_program(rng, shape, schedule, "xy", str(rng.choice(["smooth", "wild"])))
+
+
+def wide_window() -> ScanProgram:
+    """Lines so steep that 16 ticks need a window of 2^12 codes, which 32 bits do not hold."""
+    return with_output(even_waves("plain", 1, 512), max_step=65_535)
+
+
+def crossing(option: str) -> ScanProgram:
+    """Smooth lines that pass both limits."""
+    top = (1 << shapes(option)[0].dac_bits) - 1
+    return with_output(even_waves(option, 2), code_min=4 * top // 9, code_max=5 * top // 9)
+
+
+def steep_ramps() -> ScanProgram:
+    """Lines of 64 ticks from word to word, during which a ramp adds 2^32: the guard acts on every tick."""
+    program = even_waves("plain", 1)
+    schedule = replace(random_schedule(np.random.default_rng(1), 512, 1), lines=8, settle_lines=0)
+
+    def steep(axis: FrameProgram) -> FrameProgram:
+        q, words = axis.output.gain_q, np.array([0] * 6 + [20_000, 0])  # so steep that the window stays narrow
+        output = replace(axis.output, max_step=60)
+        fast = replace(axis.fast, words=words, phase=RationalPhase(512), output=output)
+        slow = SlowTable(np.array([1, 1, -1, -1] * 2) * 30_000, 72_723, 1 << 15 + q)  # 65 codes a tick
+        gains, ratios = (Knots(np.full(2, word), 8) for word in (20_000, 0))
+        return FrameProgram(fast, 8, gains, ratios, np.zeros(8, np.int64), slow)
+
+    assert isinstance(program.x, FrameProgram)
+    assert isinstance(program.y, FrameProgram)
+    return ScanProgram(steep(program.x), steep(program.y), schedule)
+
+
+def with_output(program: ScanProgram, **fields: int) -> ScanProgram:
+    def one(axis: FrameProgram) -> FrameProgram:
+        return replace(axis, fast=replace(axis.fast, output=replace(axis.output, **fields)))
+
+    assert isinstance(program.x, FrameProgram)
+    assert isinstance(program.y, FrameProgram)
+    return replace(program, x=one(program.x), y=one(program.y))
 
 
 def play_fills(library: Library, program: ScanProgram, ticks: int, code: int = 0) -> None:
@@ -299,6 +362,33 @@ def test_most_ticks_of_smooth_lines_come_from_runs(option: str, tmp_path: Path) 
             twin.play(900, "fill")
         assert twin.model.fault_counts == dict.fromkeys(twin.model.fault_counts, 0)
         assert ticks.value - before > 0.95 * 9000
+
+
+SEGMENT_COUNTS = {
+    "DAC_NOINLINE uint32_t play_segments(": "uint64_t probe_segment_ticks;\nDAC_NOINLINE uint32_t play_segments(",
+    "    axis->code = (int32_t)code;\n    return s.ticks - left;": (
+        "    axis->code = (int32_t)code;\n    probe_segment_ticks += s.ticks - left;\n    return s.ticks - left;"
+    ),
+}
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("option", common(("short",), ("plain", "short", "fine", "short_fine")))
+def test_lines_with_many_ticks_from_word_to_word_equal_the_model(option: str, tmp_path: Path) -> None:
+    """Smooth ones are played from word to word nearly all the time, those with few ticks between two words never."""
+    library = library_of(compiled(tmp_path, option, runtime=runtime_with(SEGMENT_COUNTS, tmp_path / "counting")))
+    ticks = c_uint64.in_dll(library.dll, "probe_segment_ticks")
+    play_fills(library, even_waves(option, 0), 9000)
+    assert ticks.value > 0.95 * 2 * 9000, "of both axes"
+    play_fills(library, even_waves(option, 0, LONG_LINE), 13_000)
+    assert ticks.value > 0.95 * 2 * 22_000
+    for seed in range(12):
+        play_fills(library, long_segments(option, seed), 2000)
+    for program in (jumps(*SLOW_JUMPS), wide_window(), crossing(option), steep_ramps()):
+        play_fills(library, program, 5000)
+    before = ticks.value
+    play_fills(library, even_waves(option, 0, *SHORT_LINES), 3000)
+    assert ticks.value == before
 
 
 class Loading:
@@ -514,6 +604,42 @@ MUTANTS = {
     "a window is as wide with any ramp": (" || ramp <= bank->ramp_most ?", " || true ?"),
     "runs without a window": (WINDOW, WINDOW.replace("if (out_of_window >> bank->run_bits != 0)", "if (false)")),
 }
+SUMS = "(from | to | (from + rise) | (to + rise))"
+NEAR = "            || ((first - sample + spread) | (last - sample + spread)) > 2 * spread - 1\n"
+# Of play_segments(), with either kind of multiplication.
+SEGMENT_MUTANTS = {
+    "segments have no ramp": ("            value += ramp;\n", ""),
+    "a segment begins with the ramp of the last one": ("        rest += rise + ramp;\n", ""),
+    "the ramp of a segment is a tick short": ("rest += rise + ramp;", "rest += rise;"),
+    "runs of segments begin without what the ramp has added": (
+        "const int64_t offset = bank->offset + axis->rise;",
+        "const int64_t offset = bank->offset;",
+    ),
+    "the last sample of a segment is not checked": (SUMS, "(from | (from + rise))"),
+    "the last ramp of a segment is not checked": (SUMS, "(from | to)"),
+    "a segment may move by 2^32": (NEAR, ""),
+    "a segment may pass a limit": ("\n            || !dac_has_room(bank, (int32_t)base)) {", ") {"),
+    "a run begins anywhere": ("((uint32_t)unrounded - code + half) >> bank->run_bits != 0", "false"),
+    "a segment has a tick more": ("within < asked ? within : asked,", "within < asked ? within + 1 : asked,"),
+    "a segment has all ticks that are asked for": ("within < asked ? within : asked,", "asked,"),
+    "samples of segments are rounded down": (" + (UINT32_C(1) << (BELOW_SAMPLE - 1))", ""),
+    "the code of a run of segments is lost": (
+        "    axis->code = (int32_t)code;\n    return s.ticks",
+        "    return s.ticks",
+    ),
+}
+LONG_SEGMENT_MUTANTS = {
+    "segments of any ramp": ("\n        || ramp > INT64_C(1) << 24)", ")"),
+}
+FINE_MUTANTS = {
+    "more ticks have one check than a position is exact for": ("parts - 1 < SEGMENT_MOST ?", "false ?"),
+    "steps of segments are rounded down": ("(uint32_t)(s.step >> 15) + 1,", "(uint32_t)(s.step >> 15),"),
+}
+SHORT_SEGMENT_MUTANTS = {
+    "a segment that begins late has a tick more": ("place <= UINT32_MAX - whole * step ? 1u : 0u", "1u"),
+    "any tick is the first of its segment": ("if (place >= step)", "if (false)"),
+    "the lower bits of a way are lost": ("upper << 16) + lower;", "upper << 16);"),
+}
 FED = "            out_of_window |= fed;\n            code = (fed >> bits)"
 SHAPED_WINDOW = WINDOW.replace("out_of_window >> bank", "out_of_window >> bits >> bank").replace(
     "axis->code = code", "axis->shaper = shaper;\n        axis->code = (int32_t)code"
@@ -563,6 +689,8 @@ SHORT_MUTANTS = {
         "",
     ),
 }
+ALL_MUTANTS = MUTANTS | SHORT_MUTANTS | SHAPED_MUTANTS | SHORT_SHAPED_MUTANTS
+ALL_MUTANTS |= SEGMENT_MUTANTS | LONG_SEGMENT_MUTANTS | SHORT_SEGMENT_MUTANTS | FINE_MUTANTS
 _FORK = get_context("fork")
 
 
@@ -576,8 +704,16 @@ def differs(path: Path, option: str) -> bool:
         try:
             for seed in range(3):
                 play_fills(library, even_waves(option, seed), 9000)
+                play_fills(library, even_waves(option, seed, *SHORT_LINES), 9000)
             play_fills(library, without_ramps(even_waves(option, 3)), 9000)
             play_fills(library, jumps(), 5000)
+            play_fills(library, jumps(*SLOW_JUMPS), 5000)
+            play_fills(library, wide_window(), 5000)
+            play_fills(library, crossing(option), 5000)
+            play_fills(library, steep_ramps(), 5000)
+            play_fills(library, even_waves(option, 4, LONG_LINE), 13_000)
+            for seed in range(20):
+                play_fills(library, long_segments(option, seed), 3000)
             for steep, over in product(("second", "gain", "ramp"), (0, 1, 2)):
                 play_fills(library, guarded_waves(steep, over), 3000, 1 << 15)
             for seed in range(16):
@@ -602,17 +738,20 @@ def differs(path: Path, option: str) -> bool:
             *(("short", breaks) for breaks in SHORT_MUTANTS),
             *(("shaping", breaks) for breaks in SHAPED_MUTANTS),
             *(("short_shaping", breaks) for breaks in SHORT_SHAPED_MUTANTS),
+            *(("plain", breaks) for breaks in SEGMENT_MUTANTS | LONG_SEGMENT_MUTANTS),
+            *(("short", breaks) for breaks in SEGMENT_MUTANTS | SHORT_SEGMENT_MUTANTS),
+            *((option, breaks) for option in ("fine", "short_fine") for breaks in FINE_MUTANTS),
         ],
         2,
     ),
 )
 def test_every_mutant_is_found(option: str, breaks: str, tmp_path: Path) -> None:
-    old, new = (MUTANTS | SHORT_MUTANTS | SHAPED_MUTANTS | SHORT_SHAPED_MUTANTS)[breaks]
+    old, new = ALL_MUTANTS[breaks]
     runtime = runtime_with({old: new}, tmp_path / "mutant")
     assert differs(compiled(tmp_path, option, runtime=runtime), option)
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("option", ["plain", "short", "shaping", "short_shaping"])
+@pytest.mark.parametrize("option", ["plain", "short", "shaping", "short_shaping", "fine", "short_fine"])
 def test_the_runtime_as_it_is_does_not_differ(option: str, tmp_path: Path) -> None:
     assert not differs(compiled(tmp_path, option), option)
