@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import Struct, structs
 
 from tablegen.base.input_errors import Problems, Unphysical
-from tablegen.compensation.models.operator import CENTRE_REACH
+from tablegen.compensation.operator.operator import CENTRE_REACH
 from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
 from tablegen.config.load import Setup
 from tablegen.device.dual_program import ScanProgram

@@ -13,9 +13,9 @@ from paper.printed_numbers import default_x
 
 from tablegen.base.reading import CONFIGURATION
 from tablegen.calibration.operator import branches, fit, periodic_line, plays_fit
-from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
 from tablegen.compensation.operator import operator as operators
 from tablegen.compensation.operator.file import OperatorFile, read_operator
+from tablegen.compensation.operator.operator import CENTRE_REACH, STROKE_REACH
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.simulation import run_line

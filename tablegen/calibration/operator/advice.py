@@ -10,9 +10,8 @@ from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.identification import MeasuredLine
-from tablegen.compensation.models.operator import CENTRE_REACH
 from tablegen.compensation.operator.field import Lengths, covariance
-from tablegen.compensation.operator.operator import STROKE_REACH, Operator
+from tablegen.compensation.operator.operator import CENTRE_REACH, STROKE_REACH, Operator
 from tablegen.compensation.operator.uncertainty import possible_errors
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.numerics.driver import Driver

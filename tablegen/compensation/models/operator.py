@@ -22,7 +22,7 @@ from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.minimum_acceleration_line import minimum_acceleration_waveform
-from tablegen.compensation.operator.operator import SMALL_STROKE, STROKE_REACH, Operator
+from tablegen.compensation.operator.operator import CENTRE_REACH, SMALL_STROKE, STROKE_REACH, Operator
 from tablegen.compensation.operator.piezo import OperatorPiezo, departing
 from tablegen.compensation.operator.scan_line import (
     ExpectedErrors,
@@ -44,8 +44,6 @@ from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 
-# An operator serves centres this far from any that was measured, of v_max.
-CENTRE_REACH = 0.4
 _BEND_UNKNOWN = 0.7  # of what a loop grows by its bend; on simulated piezos of four kinds it was wrong by less
 SIDES = ("forward", "backward")
 

@@ -21,6 +21,7 @@ from tablegen.numerics.elementary import log10
 
 SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is taken to come
 STROKE_REACH = 0.05  # of v_max: an operator serves strokes this far beyond the largest that was measured
+CENTRE_REACH = 0.4  # of v_max: and centres this far from any that was measured
 _MOST_MISFIT = 1.5e-3  # rms of the lines' residuals; 7e-4 and less where a family fits, 3.6e-3 for Duhem's piezo
 _INSIDE = np.linspace(-0.8, 0.8, 81)  # -1 and 1 are the turns
 END_POINTS = 48  # of a branch at either end
