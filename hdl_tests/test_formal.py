@@ -479,6 +479,7 @@ MUTANTS = {
     "slow_divisor_stays_in_the_rest": (
         "slow_divide", "dac_slow_divide", "rest <= reduces ? less : from", "rest <= from"
     ),
+    "slow_rest_is_not_reduced": ("slow_divide", "dac_slow_divide", "else if (twice || reduce)", "else if (twice)"),
     "slow_both_bits_are_one": ("slow_divide", "dac_slow_divide", "(add && here && there)", "(add && here)"),
     "slow_word_of_the_other_axis": (
         "slow_store_fast", "dac_slow_store", "fast_words[{write_bank, write_axis,", "fast_words[{write_bank, 1'b0,"
