@@ -1074,6 +1074,9 @@ def _slow() -> Iterator[Mutant]:
             ("the frame has no end", "line && after != playing_lines ?", "line ?"),
             ("the line of a commit is of the program that plays", "is_idle <= changes ? prepares : needs_idle;",
              "is_idle <= 1'b0;"),
+            ("a new program begins with the line that is due", "changes ? preparing && from_0 : needs_first;", "1'b0;"),
+            ("a scan begins with the line where the last one ended",
+             "(needs_first != is_first && next_line != {LINE_BITS{1'b0}})", "1'b0"),
         ),
         "dac_slow_store": (
             ("the ratios are the gains", "part == RATIOS) ratios", "part == GAINS) ratios"),
