@@ -93,6 +93,7 @@ PROOFS = {
     "slow_fit_of_14_bits": Proof("slow_fit_properties", 1, 0, {**_14_BITS, "LINE_BITS": 16}),
     "slow_engine": Proof("slow_engine_properties", 2, 6),
     "slow_engine_mix": Proof("slow_engine_properties", 2, 0, {"RATIO_BITS": 4, "RATIO_ZEROS": 10}),
+    "slow_line": Proof("slow_line_properties", 1, 0, {}, ("dac_slow_divide",)),
     "slow_boot": Proof("slow_boot_properties", 1, 12, words=42),
     "slow_boot_without_waits": Proof("slow_boot_properties", 1, 50, {"WAITS": 0}, covers=50, words=42),
     "slow_axis": Proof("slow_axis_properties", 1, 14, {}, ("dac_axis_serial",), 16, asserts_in_stubs=False),
@@ -590,6 +591,15 @@ ENGINE_MUTANTS = {
     "slow_mix_cut_off": ("slow_engine_mix", "12'h800", "12'h000"),
     "slow_limit_is_the_other_one": ("slow_engine_mix", "beyond ? limits ^ sign_bit", "beyond ? ~limits ^ sign_bit"),
     "slow_table_a_word_longer": ("slow_engine", "if (word_ends) begin", "if (word_ends && !enable) begin"),
+    "slow_gain_is_rounded_down": ("slow_line", "count == 6'd17 ? HALF :", "count == 6'd17 ? BETWEEN :"),
+    "slow_gain_a_bit_short": ("slow_line", "count == 6'd17 ? HALF :", "count == 6'd16 ? HALF :"),
+    "slow_ratio_is_the_gain": ("slow_line", "   here <= of_ratio ?", "   here <= 1'b0 ?"),
+    "slow_gain_of_one_knot": ("slow_line", "NEXT: begin\n                    knot <= knot + 1;", "NEXT: begin"),
+    "slow_gain_has_no_sign": ("slow_line", "{{14{between[17]}}, between};", "{14'd0, between};"),
+    "slow_gain_of_the_word_that_was": ("slow_line", ".load_part(state == HERE)", ".load_part(state == NEXT)"),
+    "slow_next_line_is_the_line": ("slow_line", "{{LINE_BITS{1'b0}}, state == SLOW_TAKE}", "{LINE_BITS+1{1'b0}}"),
+    "slow_next_line_has_no_frame": ("slow_line", ".reduce(state == PLACE || state", ".reduce(state"),
+    "slow_place_a_bit_short": ("slow_line", "{1'b0, slow_bits} + 6'd17", "{1'b0, slow_bits} + 6'd16"),
 }
 
 
@@ -606,7 +616,7 @@ def test_mutant_of_the_low_area_axis_is_not_proven(name: str, tmp_path: Path) ->
     assert not _proven(SERIAL, tmp_path, {"dac_axis_serial": original.replace(text, instead)})
 
 
-@pytest.mark.parametrize("name", long(("slow_search_without_end",), ENGINE_MUTANTS))
+@pytest.mark.parametrize("name", long(("slow_search_without_end", "slow_next_line_has_no_frame"), ENGINE_MUTANTS))
 def test_mutant_of_the_engine_is_not_proven(name: str, tmp_path: Path) -> None:
     proof, text, instead = ENGINE_MUTANTS[name]
     original = path_of("dac_slow_engine").read_text("utf-8")
