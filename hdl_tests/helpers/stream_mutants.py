@@ -1042,7 +1042,6 @@ def _slow() -> Iterator[Mutant]:
             ("the spline goes on from the last one", "PLACE: acc <= {W{1'b0}};", "PLACE: acc <= acc;"),
             ("a ramp that falls is not cut off towards 0", "m[W-1] && q != 32'd0", "1'b0"),
             ("the ramp is that of the last line", "{{LINE_BITS{1'b0}}, state == SLOW_TAKE}", "{LINE_BITS+1{1'b0}}"),
-            ("the line after the last one is not line 0", ".reduce(state == PLACE || state", ".reduce(state"),
             ("the offset is that of the next line", "state == SLOW_TAKE && !second_offset", "state == SLOW_TAKE"),
             ("the ratio is the gain", "   here <= of_ratio ?", "   here <= 1'b0 ?"),
             ("a word between knots is rounded down", "REDUCE: state <= count == 6'd17 ? HALF : DOUBLE;",
