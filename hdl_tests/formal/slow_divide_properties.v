@@ -1,6 +1,6 @@
-// dac_slow_divide by the operations of dac_slow_engine: the place of a line is floor(line 2^BITS / lines), and a word
-// between two knots is floor((here (spacing - part) + there part + spacing / 2) / spacing), which never lies outside
-// the two words. It may stand still on any clock.
+// dac_slow_divide by the operations of dac_slow_engine: the place of a line is floor(line 2^BITS / lines), where the
+// line after the last one is line 0, and a word between two knots is floor((here (spacing - part) + there part +
+// spacing / 2) / spacing), which never lies outside the two words. It may stand still on any clock.
 //
 // A step of the induction is a bit of a word, so the length of the words is no part of the argument; the products of
 // the definition ask for few bits here.
@@ -21,10 +21,10 @@ module slow_divide_properties #(
     input wire [BITS-1:0]      here,
     input wire [BITS-1:0]      there
 );
-    localparam [2:0] REST = 3'd0, PART = 3'd1, TWICE = 3'd2, ADD = 3'd3, REDUCE = 3'd4, HALF = 3'd5, NEAREST = 3'd6;
-    localparam [2:0] DONE = 3'd7;
+    localparam [3:0] REST = 4'd0, PART = 4'd1, TWICE = 4'd2, ADD = 4'd3, REDUCE = 4'd4, HALF = 4'd5, NEAREST = 4'd6;
+    localparam [3:0] DONE = 4'd7, WRAP = 4'd8;
 
-    reg [2:0] state;
+    reg [3:0] state;
     reg [3:0] bits;  // that are done
     reg place;
     reg [REST_BITS-1:0] of, part;
@@ -34,14 +34,15 @@ module slow_divide_properties #(
         bits = 0;
     end
     wire begins = state == REST && start;
-    always @* if (begins) assume (divisor != 0 && !divisor[REST_BITS-1] && value < divisor);
+    wire after_last = places && value == divisor;
+    always @* if (begins) assume (divisor != 0 && !divisor[REST_BITS-1] && (value < divisor || after_last));
     always @(posedge clock) if (enable) case (state)
         REST: if (start) begin
-            state <= places ? TWICE : PART;
-            {place, of, part, u, v} <= {places, divisor, value, here, there};
+            state <= places ? WRAP : PART;
+            {place, of, part, u, v} <= {places, divisor, after_last ? {REST_BITS{1'b0}} : value, here, there};
             bits <= 0;
         end
-        PART: state <= TWICE;
+        PART, WRAP: state <= TWICE;
         TWICE: begin
             state <= !place ? ADD : bits == BITS - 1 ? DONE : TWICE;
             if (place) bits <= bits + 1;
@@ -62,7 +63,7 @@ module slow_divide_properties #(
     dac_slow_divide #(.REST_BITS(REST_BITS), .QUOTIENT_BITS(QUOTIENT_BITS)) division (
         .clock(clock), .enable(enable), .load_rest(begins), .value(value), .load_whole(begins), .divisor(divisor),
         .load_part(state == PART), .twice(state == TWICE), .add(state == ADD),
-        .reduce(state == REDUCE || state == NEAREST), .half(state == HALF), .here(u_left[BITS-1]),
+        .reduce(state == WRAP || state == REDUCE || state == NEAREST), .half(state == HALF), .here(u_left[BITS-1]),
         .there(v_left[BITS-1]), .reduces(reduces), .quotient(quotient)
     );
 
@@ -93,12 +94,14 @@ module slow_divide_properties #(
         if (state != REST) begin
             assert (of != 0 && !of[REST_BITS-1] && part < of && division__whole == of);
             if (!place && state != PART) assert (division__part == part);
-            if (place) assert (state == TWICE || state == DONE);
+            if (place) assert (state == WRAP || state == TWICE || state == DONE);
             if (state == TWICE) assert (bits < BITS);
             if (state == ADD) assert (bits < BITS);
             if (state == REDUCE) assert (bits != 0);
             if (state == HALF || state == NEAREST || state == DONE) assert (bits == BITS);
             if (state == PART) assert (bits == 0 && division__rest == part);
+            else if (state == WRAP)
+                assert (bits == 0 && (division__rest == part || (part == 0 && division__rest == of)));
             else begin
                 assert (made == (place ? of_place : of_words));
                 assert (division__rest < (state == REDUCE || state == NEAREST ? {of, 1'b0} : {1'b0, of}));

@@ -4,7 +4,8 @@
 // word, its second word and the ratio of the line, which is what the divisions have left.
 //
 // `watch` picks any word. Tables of 4 and 8 words of 8 and 9 bits: a step of the induction is a bit of a product, so
-// their number is no part of the argument. Nothing is said here of the offset, the ramp and the gain that it writes.
+// their number is no part of the argument. slow_line_properties has gain and ratio; of the offset and the ramp that it
+// writes nothing is said.
 
 `default_nettype none
 

@@ -86,13 +86,16 @@ module slow_fit_properties #(
     // What makes them inductive.
     wire uut__spoilt, uut__x_known, uut__y_known, uut__x_spaced, uut__y_spaced;
     wire [6:0] uut__x_knots, uut__y_knots;
-    wire [4:0] uut__x_bits, uut__y_bits;
-    wire [17:0] uut__count;
+    wire [3:0] uut__x_bits, uut__y_bits;
+    // The count ends at a power of 2 that no program needs more words than.
+    localparam COUNT_BITS = $clog2(X_WORDS + Y_WORDS + 4 * 65 + (2 << SLOW_INDEX_BITS)) + 1;
+    localparam [19:0] END = 1 << (COUNT_BITS - 1);
+    wire [COUNT_BITS-1:0] uut__count;
     always @* begin
         assert (uut__spoilt == is_wrong);
         assert (uut__x_known == x_12_fits && uut__y_known == y_12_fits);
         assert (uut__x_spaced == x_13_fits && uut__y_spaced == y_13_fits);
-        assert (uut__count == (words < 131072 ? words : 131072));
+        assert (uut__count == (words < END ? words : END));
         if (x_12_fits) assert (uut__x_knots == x_knots && uut__x_bits == x_bits && x_knots <= 65);
         if (y_12_fits) assert (uut__y_knots == y_knots && uut__y_bits == y_bits && y_knots <= 65);
         if (x_12_fits) assert (x_bits <= SLOW_INDEX_BITS);

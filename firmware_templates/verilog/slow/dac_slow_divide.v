@@ -1,6 +1,6 @@
 // The divisions of a line, a bit in a clock or in three: its place in the frame, and a word between two knots.
 //
-//   place    quotient = floor(line 2^BITS / whole), by a `twice` for each bit
+//   place    quotient = floor((line modulo whole) 2^BITS / whole), by a `reduce` and a `twice` for each bit
 //   search   rest = line modulo whole, by `reduce` until `reduces` is low
 //   between  quotient = floor((here (whole - part) + there part + whole / 2) / whole), for which part = rest: for each
 //            of the 18 bits of the unsigned words here and there a `twice`, an `add` and a `reduce`; then a `half` and

@@ -70,19 +70,17 @@ module dac_slow_engine #(
         done = 1'b0;
     end
 
-    wire [LINE_BITS:0] line_wide = {1'b0, line} + 1;
-    wire [LINE_BITS-1:0] line_after = line_wide == lines ? {LINE_BITS{1'b0}} : line_wide[LINE_BITS-1:0];
-
+    // Of the line, and then of the next one: PLACE takes `lines` off where that is line 0.
+    wire [LINE_BITS:0] line_or_next = {1'b0, line} + {{LINE_BITS{1'b0}}, state == SLOW_TAKE};
     wire reduces;
     wire [PLACE_BITS-1:0] quotient;
     dac_slow_divide #(.REST_BITS(REST_BITS), .QUOTIENT_BITS(PLACE_BITS)) division (
         .clock(clock), .enable(enable),
-        .load_rest(state == PLACE || state == KNOTS),
-        .value({2'b00, state == PLACE && second_offset ? line_after : line}),
-        .load_whole(state == PLACE || state == SPACED),
-        .divisor(state == PLACE ? {1'b0, lines} : page_word[REST_BITS-1:0]),
+        .load_rest(state == COPY || state == SLOW_TAKE || state == KNOTS), .value({1'b0, line_or_next}),
+        .load_whole(state == COPY || state == SLOW_TAKE || state == SPACED),
+        .divisor(state == SPACED ? page_word[REST_BITS-1:0] : {1'b0, lines}),
         .load_part(state == HERE), .twice(state == DIVIDE || state == DOUBLE), .add(state == ADD),
-        .reduce(state == SEARCH || state == REDUCE || state == NEAREST), .half(state == HALF),
+        .reduce(state == PLACE || state == SEARCH || state == REDUCE || state == NEAREST), .half(state == HALF),
         .here(here[17]), .there(there[17]), .reduces(reduces), .quotient(quotient)
     );
 
@@ -315,7 +313,7 @@ module dac_slow_engine #(
                                            {{WORD_BITS-1{1'b0}}, 1'b1} << (X_WORD_BITS - 1);
     assign write_table = enable && state == MIXED;
     assign table_data = beyond ? limits ^ sign_bit : mixed[WORD_BITS-1:0];
-    wire unused = &{page_word, line_wide[LINE_BITS]};
+    wire unused = &{page_word};
 
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.
     generate

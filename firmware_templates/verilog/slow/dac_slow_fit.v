@@ -28,6 +28,8 @@ module dac_slow_fit #(
     localparam [6:0] MOST_KNOTS = 7'd65;
     localparam [4:0] LEAST_BITS = 5'd3, MOST_BITS = SLOW_INDEX_BITS[4:0];
     localparam [31:0] WORDS = (1 << X_INDEX_BITS) + (1 << Y_INDEX_BITS) + 8;
+    // The highest bit of the count ends it, at as many words as any program needs or more.
+    localparam COUNT_BITS = $clog2(WORDS + 4 * MOST_KNOTS + (2 << SLOW_INDEX_BITS)) + 1;
 
     wire [13:0] place = address[13:0];
     wire x_part = region == X_PARTS, y_part = region == Y_PARTS;
@@ -49,8 +51,8 @@ module dac_slow_fit #(
     reg x_known, y_known;      // how long the parts of the idle program are, by a word that fits
     reg x_spaced, y_spaced;    // a spacing that fits was written last
     reg [6:0] x_knots, y_knots;
-    reg [4:0] x_bits, y_bits;  // of the index of a slow table
-    reg [17:0] count;
+    reg [3:0] x_bits, y_bits;  // of the index of a slow table
+    reg [COUNT_BITS-1:0] count;
     initial begin
         spoilt = 1'b0;
         x_known = 1'b0;
@@ -59,9 +61,9 @@ module dac_slow_fit #(
         y_spaced = 1'b0;
         x_knots = 7'd0;
         y_knots = 7'd0;
-        x_bits = 5'd0;
-        y_bits = 5'd0;
-        count = 18'd0;
+        x_bits = 4'd0;
+        y_bits = 4'd0;
+        count = 0;
     end
     always @(posedge clock) begin
         if (spoils)
@@ -72,16 +74,18 @@ module dac_slow_fit #(
         y_known <= !take && (writes_part && y_page ? is_part : y_known);
         x_spaced <= !take && (writes_spacing && x_page ? is_spacing : x_spaced);
         y_spaced <= !take && (writes_spacing && y_page ? is_spacing : y_spaced);
-        if (writes_part && x_page) {x_bits, x_knots} <= {data[12:8], data[6:0]};
-        if (writes_part && y_page) {y_bits, y_knots} <= {data[12:8], data[6:0]};
+        if (writes_part && x_page) {x_bits, x_knots} <= {data[11:8], data[6:0]};
+        if (writes_part && y_page) {y_bits, y_knots} <= {data[11:8], data[6:0]};
         if (take)
-            count <= 18'd0;
-        else if (write && (x_page || y_page || x_part || y_part) && !count[17])
+            count <= 0;
+        else if (write && (x_page || y_page || x_part || y_part) && !count[COUNT_BITS-1])
             count <= count + 1;
     end
     // Gains and ratios are as many.
     wire [7:0] knots = {1'b0, x_knots} + {1'b0, y_knots};
-    wire [17:0] needed = WORDS[17:0] + {9'd0, knots, 1'b0} + (18'd1 << x_bits) + (18'd1 << y_bits);
+    localparam [COUNT_BITS-1:0] ONE = 1;
+    wire [COUNT_BITS-1:0] needed = WORDS[COUNT_BITS-1:0] + {{COUNT_BITS-9{1'b0}}, knots, 1'b0} + (ONE << x_bits) +
+                                   (ONE << y_bits);
     assign fits = !spoilt && x_known && y_known && x_spaced && y_spaced && count >= needed;
 
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason.

@@ -79,9 +79,11 @@ module dac_slow_part #(
             else lines_1 <= data[LINE_BITS:0];
         end
 
-    // The line that is needed next, and the one that is worked out, or was.
-    reg [LINE_BITS-1:0] next_line, line_at;
-    reg is_idle;  // it is a line of the idle program
+    // The line that is needed next, and the one that is worked out, or was: this one, or line 0 in its place.
+    reg [LINE_BITS-1:0] next_line;
+    reg is_first;  // it is line 0
+    reg is_idle;   // it is a line of the idle program
+    wire [LINE_BITS-1:0] line_at = is_first ? {LINE_BITS{1'b0}} : next_line;
     wire ended;
     wire [LINE_BITS:0] after = {1'b0, line_number} + 1;
     wire [LINE_BITS-1:0] line_after = line && after != playing_lines ? after[LINE_BITS-1:0] : {LINE_BITS{1'b0}};
@@ -89,13 +91,15 @@ module dac_slow_part #(
     wire needs_idle = preparing && (!running || is_idle);
     wire prepares = preparing && (!at_frame || line_after == {LINE_BITS{1'b0}});  // from the line that begins
     wire from_0 = !keeps && !at_frame;  // the idle program begins with its line 0, whatever line is due
-    wire [LINE_BITS-1:0] needs_line = !running || (needs_idle && from_0) ? {LINE_BITS{1'b0}} : next_line;
-    wire anew = changes || needs_idle != is_idle || needs_line != line_at;
-    wire ready = ended && !anew;
+    wire needs_first = !running || (needs_idle && from_0);
+    wire other = needs_idle != is_idle || (needs_first != is_first && next_line != {LINE_BITS{1'b0}});
+    wire anew = changes || other;
+    wire ready = ended && !other;  // and not on the clock of `changes`, on which no tick is accepted
+    wire waits_for_line = preparing && is_idle && !committed;
     initial begin
         preparing = 1'b0;
         next_line = 0;
-        line_at = 0;
+        is_first = 1'b0;
         is_idle = 1'b0;
     end
     always @(posedge clock) begin
@@ -106,17 +110,17 @@ module dac_slow_part #(
             next_line <= line_after;
         if (anew) begin
             is_idle <= changes ? prepares : needs_idle;
-            line_at <= !changes ? needs_line : preparing && from_0 ? {LINE_BITS{1'b0}} : line_after;
+            is_first <= changes ? preparing && from_0 : needs_first;
         end
     end
-    assign prepared = preparing && is_idle && ready && !committed;
+    assign prepared = waits_for_line && ready && !changes;
     // On the clock before a prepared program is committed, a tick would not take it, and play its line as an old one.
-    assign late = running && first && (!ready || prepared);
+    assign late = running && first && (!ready || waits_for_line);
 
     // A trigger of a scan that runs is the matter of dac_scan. A tick that takes a program at rest leaves its line 0.
     reg waits;
     initial waits = 1'b0;
-    wire can_start = running || (ready && !take);
+    wire can_start = running || (ready && !changes && !take);
     wire asks = (trigger && (arm || armed)) || waits;
     always @(posedge clock) waits <= asks && !can_start && !park && (loaded || (committed && !discard));
     assign start = (trigger || waits) && can_start;
