@@ -46,13 +46,20 @@ def short_sine(folder: Path, *edits: str) -> Setup:
     )  # fmt: skip
 
 
-def response_csv(plant: ForeignPlant, highest_hz: float) -> str:
-    """The response of a plant behind its hysteresis as measured, with a thousandth of noise of its gain."""
-    f = np.geomspace(50.0, highest_hz, 600)
+def response_csv(
+    plant: ForeignPlant, highest_hz: float, count: int = 600, noise: float = 1e-3, turning: float = 0.0, seed: int = 5
+) -> str:
+    """The response of a plant behind its hysteresis as measured, with noise of its gain, and of its phase in radians.
+
+    Without other arguments: 600 points, and a thousandth of noise of the gain.
+    """
+    f = np.geomspace(50.0, highest_hz, count)
     response = plant.dynamics(f)
-    random = np.random.default_rng(5)
-    gain = np.abs(response) * (1.0 + 1e-3 * random.standard_normal(len(f)))
+    random = np.random.default_rng(seed)
+    gain = np.abs(response) * (1.0 + noise * random.standard_normal(count))
     phase = np.unwrap(np.angle(response, deg=True), period=360.0)
+    if turning:
+        phase += np.degrees(turning * random.standard_normal(count))
     rows = "\n".join(f"{one:.6g},{g:.6g},{p:.6g}" for one, g, p in zip(f, gain, phase, strict=True))
     return f"hz,gain,phase_deg\n{rows}\n"
 
