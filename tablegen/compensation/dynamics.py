@@ -7,9 +7,11 @@ import numpy as np
 from msgspec import Struct
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.numerics.arrays import Bools, Floats
+from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.numerics.elementary import exp
 from tablegen.numerics.turns import sine_and_cosine
+
+_FOLLOWED_TURNS = 0.375  # of the phase between two points, up to which 1 / H is followed
 
 
 class Response(Protocol):
@@ -91,7 +93,12 @@ class Measured(Struct, frozen=True):
     phase_turns: Floats
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Return 1 / H(f); gain and phase are interpolated linearly.
+        """Return 1 / H(f), interpolated by cubics between the points.
+
+        1 / H of a mode is a polynomial of the second degree, times a phase that is linear in f by a dead time: cubics
+        with the slopes of parabolas through three points follow it, however sharp the resonance is. The phase
+        that is linear from the first point to the last is taken out before. Where the rest of it turns by more than
+        3/8 between two points, these are too far apart, and gain and phase are linear.
 
         Below the first point the gain is that of it, and the phase is linear to 0 at 0 Hz, as that of a dead time, or
         to the nearest half turn where the response is inverted.
@@ -124,7 +131,18 @@ class Measured(Struct, frozen=True):
         at_rest = round(2.0 * first) / 2.0
         below = at_rest + np.minimum(f_hz / self.f_hz[0], 1.0) * (first - at_rest)
         s, c = sine_and_cosine(np.where(f_hz < self.f_hz[0], below, phase))
-        return c / gain, -s / gain
+        late = (float(self.phase_turns[-1]) - first) / float(self.f_hz[-1] - self.f_hz[0])  # turns per Hz
+        rest = self.phase_turns - late * (self.f_hz - self.f_hz[0])
+        near = (np.abs(np.diff(rest))[left] <= _FOLLOWED_TURNS) & (f_hz >= self.f_hz[0])
+        sines, cosines = sine_and_cosine(rest)
+        real, imaginary = (
+            _cubic(self.f_hz, values, left, share) for values in (cosines / self.gain, -sines / self.gain)
+        )
+        sine, cosine = sine_and_cosine(late * (f - self.f_hz[0]))
+        return (
+            np.where(near, real * cosine + imaginary * sine, c / gain),
+            np.where(near, imaginary * cosine - real * sine, -s / gain),
+        )
 
     @property
     def resonance_hz(self) -> float:
@@ -141,6 +159,31 @@ class Measured(Struct, frozen=True):
     def highest_hz(self) -> float:
         """The frequency of the last point."""
         return float(self.f_hz[-1])
+
+
+def _cubic(x: Floats, y: Floats, left: Ints, share: Floats) -> Floats:
+    """Return the cubics through points whose slopes there are those of the parabola through the nearest three.
+
+    Parameters
+    ----------
+    x, y
+        Ascending abscissae and values, shape (points,); two points make a straight line.
+    left, share
+        Index of the point before each place, and how much of the way to the next one has passed; any shape.
+    """
+    steps = np.diff(x)
+    secants = np.diff(y) / steps
+    if len(x) == 2:
+        slopes = np.array([secants[0], secants[0]])
+    else:
+        slopes = np.empty_like(y)
+        slopes[1:-1] = (steps[:-1] * secants[1:] + steps[1:] * secants[:-1]) / (steps[:-1] + steps[1:])
+        slopes[0] = 2.0 * secants[0] - slopes[1]
+        slopes[-1] = 2.0 * secants[-1] - slopes[-2]
+    rest = 1.0 - share
+    ends = y[left] * (rest * rest * (1.0 + 2.0 * share)) + y[left + 1] * (share * share * (1.0 + 2.0 * rest))
+    bend = steps[left] * (share * rest) * (slopes[left] * rest - slopes[left + 1] * share)
+    return np.asarray(ends + bend, dtype=np.float64)
 
 
 def capped_inverse(response: Response, f_hz: Floats, max_boost_db: float) -> tuple[Floats, Floats, Bools]:

@@ -10,6 +10,7 @@ from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
+from tablegen.compensation.dynamics import Response
 from tablegen.config.load import Setup, load
 from tablegen.virtual.experiments import sensor_trace
 from tablegen.virtual.scanner import VirtualAxis
@@ -31,9 +32,12 @@ class Played:
         return np.interp(ticks, at, moved, period=1.0)
 
 
-def fitted(traces: list[Trace]) -> OperatorFit:
-    """Of traces with 100 V at most, on an axis whose sensitivity is not known to change."""
-    return fit_operator([periodic_line(trace, V_MAX) for trace in traces], None, lambda _: 1.0)
+def fitted(traces: list[Trace], response: Response | None = None) -> OperatorFit:
+    """Of traces with 100 V at most, on an axis whose sensitivity is not known to change.
+
+    ``response`` is that of the scanner file, which is taken out of the traces.
+    """
+    return fit_operator([periodic_line(trace, V_MAX) for trace in traces], response, lambda _: 1.0)
 
 
 def foreign_traces(plant: ForeignPlant) -> list[Trace]:

@@ -1,13 +1,16 @@
 """Scans with a sine on the fast axis, on piezos that the project does not contain: their codes and pixels, played."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from editing import SCAN, SCANNER, edited, write_pair
 from foreign_plants import Floats, ForeignPlant, ManyPlays
 from operator_files import operator_file
 
+from tablegen.compensation.dynamics import Measured
 from tablegen.compensation.operator.file import OperatorFile, operator_text
+from tablegen.compensation.response_file import read_response
 from tablegen.config.load import Setup, load
 from tablegen.planning.line_plan import Plan
 
@@ -43,15 +46,30 @@ def short_sine(folder: Path, *edits: str) -> Setup:
     )  # fmt: skip
 
 
-def response_csv(plant: ForeignPlant, highest_hz: float) -> str:
-    """The response of a plant behind its hysteresis as measured, with a thousandth of noise of its gain."""
-    f = np.geomspace(50.0, highest_hz, 600)
+def response_csv(
+    plant: ForeignPlant, highest_hz: float, count: int = 600, noise: float = 1e-3, turning: float = 0.0, seed: int = 5
+) -> str:
+    """The response of a plant behind its hysteresis as measured, with noise of its gain, and of its phase in radians.
+
+    Without other arguments: 600 points, and a thousandth of noise of the gain.
+    """
+    f = np.geomspace(50.0, highest_hz, count)
     response = plant.dynamics(f)
-    random = np.random.default_rng(5)
-    gain = np.abs(response) * (1.0 + 1e-3 * random.standard_normal(len(f)))
+    random = np.random.default_rng(seed)
+    gain = np.abs(response) * (1.0 + noise * random.standard_normal(count))
     phase = np.unwrap(np.angle(response, deg=True), period=360.0)
+    if turning:
+        phase += np.degrees(turning * random.standard_normal(count))
     rows = "\n".join(f"{one:.6g},{g:.6g},{p:.6g}" for one, g, p in zip(f, gain, phase, strict=True))
     return f"hz,gain,phase_deg\n{rows}\n"
+
+
+def measured_response(text: str) -> Measured:
+    """The response of a CSV as a build reads it."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "response.csv"
+        path.write_text(text, "ascii")
+        return read_response(path)
 
 
 def text_of(file: OperatorFile) -> bytes:

@@ -8,6 +8,8 @@ from tablegen.numerics.arrays import Floats
 
 Complex = npt.NDArray[np.complex128]
 
+_FOLLOWED_TURNS = 0.375  # of the phase between two points, up to which 1 / H is followed
+
 
 def passes(passage: ManifestPassage, f_hz: Floats) -> Complex:
     """Return the complex gain of a passage for errors.
@@ -34,9 +36,25 @@ def passes(passage: ManifestPassage, f_hz: Floats) -> Complex:
 def _measured(response: ManifestResponse, f_hz: Floats) -> Complex:
     """Return a measured response.
 
-    Gain and phase are linear between the points; below the first the phase goes to the half turn that is nearest.
+    1 / H without the phase that is linear from the first point to the last is a cubic between two points, whose slopes
+    there are those of parabolas through three points; gain and phase are linear where the rest of the phase turns by
+    more than 3/8. Below the first point the gain stays, and the phase goes to the half turn that is nearest.
     """
-    first = response.phase_turns[0]
-    hz, turns = [0.0, *response.hz], [np.rint(2.0 * first) / 2.0, *response.phase_turns]
-    gain = np.interp(f_hz, response.hz, response.gain)
-    return np.asarray(gain * np.exp(2j * np.pi * np.interp(f_hz, hz, turns)))
+    points, gains, turns = (np.array(values) for values in (response.hz, response.gain, response.phase_turns))
+    first = float(turns[0])
+    linear = np.interp(f_hz, points, gains) * np.exp(
+        2j * np.pi * np.interp(f_hz, [0.0, *points], [np.rint(2.0 * first) / 2.0, *turns])
+    )
+    ramp = (turns[-1] - first) / (points[-1] - points[0])
+    rest = turns - ramp * (points - points[0])
+    inverse = np.exp(-2j * np.pi * rest) / gains
+    slopes = np.gradient(inverse, points, edge_order=2 if len(points) > 2 else 1)
+    k = np.clip(np.searchsorted(points, f_hz) - 1, 0, len(points) - 2)
+    step = points[k + 1] - points[k]
+    t = (np.clip(f_hz, points[0], points[-1]) - points[k]) / step
+    # The cubic by powers of t: value and slope of its beginning, then what is left to those of its end.
+    missing, turned = inverse[k + 1] - inverse[k] - step * slopes[k], step * (slopes[k + 1] - slopes[k])
+    cubic = inverse[k] + t * (step * slopes[k] + t * (3.0 * missing - turned + t * (turned - 2.0 * missing)))
+    followed = (np.abs(np.diff(rest))[k] <= _FOLLOWED_TURNS) & (f_hz >= points[0])
+    late = np.exp(2j * np.pi * ramp * (f_hz - points[0]))
+    return np.asarray(np.where(followed, late / np.where(followed, cubic, 1.0), linear), dtype=np.complex128)
