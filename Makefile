@@ -9,7 +9,8 @@
 # make instructions what the C takes on Cortex-M and RISC-V, into docs/instructions.md, and what tables take, into the
 #                package and docs/tables.md
 # make link      what an upload takes, into docs/upload.md
-# make fuzz      a million inputs for the C link, plain, with splines and shaping, and with z, with sanitizers
+# make fuzz      a million inputs for the C link, plain, with splines and shaping, with z, and with moves of slow parts,
+#                with sanitizers
 # make bench     tablegen beside what others use, into benchmarks/results.md (ONLY=line: that section)
 # make cost      what a build costs, against importing numpy, and whether that is within its limits
 # make figures   the pictures of the README and the docs; STAGE=FOLDER has the records of the real stage
@@ -121,16 +122,17 @@ link: $(VENV)/installed-test
 # What is found goes into build/fuzz; what reaches something new may go into the corpus: build/fuzz/link -merge=1.
 FUZZ_RUNS ?= 1000000
 FUZZED := $(wildcard firmware_templates/c/dac_*.[ch]) tests/runtime_c/fuzz/link_fuzz.c
-# The runtime as most have it, with all that it can play, and with a second sequencer for z.
+# The runtime as most have it, with all that it can play, with a second sequencer for z, and of scans at an angle.
 build/fuzz/link_all: FUZZ_FLAGS := -DDAC_SPLINE=1 -DDAC_SHAPING=3
 build/fuzz/link_z: FUZZ_FLAGS := -DDAC_SPLINE=1 -DDAC_COMMIT_MODES=1 -DDAC_LINK_Z=1
-build/fuzz/link build/fuzz/link_all build/fuzz/link_z: $(FUZZED)
+build/fuzz/link_slow: FUZZ_FLAGS := -DDAC_SPLINE=1 -DDAC_SLOW_PART=1 -DDAC_MOVE=1
+build/fuzz/link build/fuzz/link_all build/fuzz/link_z build/fuzz/link_slow: $(FUZZED)
 	@.ci/system-packages clang libclang-rt-dev
 	@mkdir -p $(@D)/found
 	clang -std=c99 -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all -Wall -Wextra -Werror \
 	    $(FUZZ_FLAGS) -Ifirmware_templates/c $(filter %.c,$(FUZZED)) -o $@
 
-fuzz: build/fuzz/link build/fuzz/link_all build/fuzz/link_z
+fuzz: build/fuzz/link build/fuzz/link_all build/fuzz/link_z build/fuzz/link_slow
 	for target in $^; do $$target -runs=$(FUZZ_RUNS) -seed=1 -max_len=400 -timeout=10 -artifact_prefix=build/fuzz/ \
 	    build/fuzz/found tests/runtime_c/fuzz/corpus || exit; done
 

@@ -12,6 +12,8 @@ from c_mutants_shaping import MUTANTS as SHAPED
 from kept_objects import objects
 from limits import within
 from link_mutants import MUTANTS, Mutant
+from test_c_link_moves import SLOW_MUTANTS as MOVED
+from test_c_link_slow import MUTANTS as SLOW
 from test_c_link_z import MUTANTS as OF_Z
 
 from tablegen.base.resources import c_link, c_runtime
@@ -34,11 +36,13 @@ FOUND = {
 }
 
 
-# As `make fuzz` compiles it: the runtime as most have it, with all that it can play, and with a second sequencer for z.
+# As `make fuzz` compiles it: the runtime as most have it, with all that it can play, with a second sequencer for z, and
+# of scans at an angle that are moved.
 TARGETS: dict[str, tuple[str, ...]] = {
     "plain": (),
     "all": ("-DDAC_SPLINE=1", "-DDAC_SHAPING=3"),
     "z": ("-DDAC_SPLINE=1", "-DDAC_COMMIT_MODES=1", "-DDAC_LINK_Z=1"),
+    "slow": ("-DDAC_SPLINE=1", "-DDAC_SLOW_PART=1", "-DDAC_MOVE=1"),
 }
 # Codes of a buffer that are not those of steps, of what only the second target plays.
 FOUND_WITH_ALL: dict[str, tuple[str, str, str]] = {
@@ -46,6 +50,11 @@ FOUND_WITH_ALL: dict[str, tuple[str, str, str]] = {
     "a shaped tick has half a code less": next(
         (each.file, each.old, each.new) for each in SHAPED if each.breaks == "a tick has half a code less"
     ),
+}
+# Gains that change while they play, and a read behind the last.
+FOUND_WITH_SLOW = {
+    name: found[name]
+    for found, name in ((MOVED, "a move writes gains that play"), (SLOW, "knots need not reach the end"))
 }
 # A z that is not on the ticks of x and y, or not of their scan.
 FOUND_WITH_Z = ("z is not committed", "z has no mode of its COMMIT", "a trigger is of x and y alone")
@@ -95,3 +104,8 @@ def test_the_corpus_finds_what_is_broken_in_splines_and_shaping(name: str, tmp_p
 @pytest.mark.parametrize("name", FOUND_WITH_Z)
 def test_the_corpus_finds_what_is_broken_in_z(name: str, tmp_path: Path) -> None:
     assert replay(tmp_path, "z", Mutant(name, *OF_Z[name])).returncode != 0
+
+
+@pytest.mark.parametrize("name", FOUND_WITH_SLOW)
+def test_the_corpus_finds_what_is_broken_in_slow_parts(name: str, tmp_path: Path) -> None:
+    assert replay(tmp_path, "slow", Mutant(name, *FOUND_WITH_SLOW[name])).returncode != 0

@@ -13,10 +13,13 @@
  *     0x65                 a reset
  *     0x66, n              100 n milliseconds
  *     0x67, n              the COMMIT of an upload with a mode, compiled with DAC_COMMIT_MODES=1
+ *     0x68, n              a MOVE to the words of the last upload with changes (place, difference) in n bytes, compiled
+ *                          with DAC_MOVE=1
  * Frames get their tags, so that a key keeps nobody from the states behind it. Compiled with DAC_SPLINE=1 uploads are
  * of cubic tables where the options say so; a shaped program is a change of word 11 of the page of an axis. Compiled
  * with DAC_LINK_Z=1 the device has a second sequencer; where the options say so its first program and uploads have z,
- * and every second change is one of the image of z.
+ * and every second change is one of the image of z. Compiled with DAC_SLOW_PART=1 uploads have slow parts where the
+ * options say so, and every second change is one of the words behind the program words.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +28,7 @@
 
 enum { X_BITS = 4, Y_BITS = 3, X_WORDS = 1 << X_BITS, Y_WORDS = 1 << Y_BITS, HARMONICS = 3 };
 enum { LINE_TICKS = 24, LINES = 3 };
-enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64, Z = 128 };
+enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64, Z = 128, SLOW = 128 };
 enum { MOST_TICKS = 1500, MOST_FILL = 64, POWER_UP = 2000 };
 enum { CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000 };
 
@@ -57,6 +60,23 @@ static uint32_t clock_ms;
 static dac_word boot_x[DAC_TABLE_ROOM(X_BITS)], boot_y[DAC_TABLE_ROOM(Y_BITS)];
 static dac_program boot;
 static uint8_t image[DAC_LINK_PROGRAM + 2 * (X_WORDS + Y_WORDS)];
+#if DAC_SLOW_PART
+enum { KNOTS = 3, SLOW_BITS = 3, SLOW_WORDS = 1 << SLOW_BITS };
+#define SLOW_MEMORY(axis, bits, words)                                                                                \
+    static int8_t axis##_second[2][words];                                                                            \
+    static dac_word axis##_slow[2][DAC_LINK_SLOW_ROOM(SLOW_BITS)], axis##_mixed[DAC_TABLE_ROOM(bits)];                 \
+    static int32_t axis##_gains[2][KNOTS], axis##_moved_gains[2][KNOTS];                                              \
+    static int16_t axis##_ratios[2][KNOTS]
+#define SLOW_OF(axis)                                                                                                 \
+    , {{axis##_second[0], axis##_slow[0], axis##_gains[0], axis##_ratios[0]},                                         \
+       {axis##_second[1], axis##_slow[1], axis##_gains[1], axis##_ratios[1]}}, axis##_mixed,                          \
+       {axis##_moved_gains[0], axis##_moved_gains[1]}
+SLOW_MEMORY(x, X_BITS, X_WORDS);
+SLOW_MEMORY(y, Y_BITS, Y_WORDS);
+static uint8_t slow_image[DAC_LINK_PROGRAM + 3 * (X_WORDS + Y_WORDS) + 2 * (2 * SLOW_WORDS + 5 * KNOTS)];
+#else
+#define SLOW_OF(axis)
+#endif
 static uint8_t fourier[DAC_LINK_PROGRAM + 8 * (2 * HARMONICS + 1)];
 
 static bool permitted(void)
@@ -87,9 +107,9 @@ static const dac_link_config z_config = {
 
 static dac_link_config config = {
     .x = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, X_BITS,
-          DAC_TABLE_ROOM(X_BITS), {x_tables[0], x_tables[1]}, x_words},
+          DAC_TABLE_ROOM(X_BITS), {x_tables[0], x_tables[1]}, x_words SLOW_OF(x)},
     .y = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, Y_BITS,
-          DAC_TABLE_ROOM(Y_BITS), {y_tables[0], y_tables[1]}, y_words},
+          DAC_TABLE_ROOM(Y_BITS), {y_tables[0], y_tables[1]}, y_words SLOW_OF(y)},
     .harmonics = HARMONICS,
     .sine_index_bits = X_BITS,
     .sine = sine,
@@ -99,6 +119,10 @@ static dac_link_config config = {
     .identity_bytes = sizeof identity,
     .boot_persists = true,
     .milliseconds = milliseconds,
+#if DAC_SLOW_PART
+    .slow_knots = KNOTS,
+    .slow_index_bits = SLOW_BITS,
+#endif
 #if DAC_LINK_Z
     .stop_ticks = stop_ticks,
 #endif
@@ -129,6 +153,42 @@ static void put_program(uint8_t *bytes, uint32_t harmonics)
     put_axis(bytes + 128, LINE_TICKS * LINES, harmonics);
 }
 
+#if DAC_SLOW_PART
+/* Words of `bytes` bytes each, the lowest first; returns what is behind them. */
+static uint8_t *put_part(uint8_t *at, unsigned count, unsigned bytes, int32_t first, int32_t step)
+{
+    for (unsigned i = 0; i < count; i++)
+        for (unsigned byte = 0; byte < bytes; byte++)
+            *at++ = (uint8_t)((uint32_t)(first + (int32_t)i * step) >> 8 * byte);
+    return at;
+}
+
+/* The tables of the other image with a slow part on both axes. */
+static void put_slow_image(void)
+{
+    const uint64_t whole = UINT64_C(1) << 32;
+    const uint32_t slow[] = {0, KNOTS | SLOW_BITS << 8, (LINES + KNOTS - 2) / (KNOTS - 1), (uint32_t)(whole / LINES),
+                             (uint32_t)(whole % LINES)};
+    const uint8_t *from = image + DAC_LINK_PROGRAM;
+    uint8_t *at = slow_image + DAC_LINK_PROGRAM;
+
+    memcpy(slow_image, image, DAC_LINK_PROGRAM);
+    put_axis(slow_image + 128, LINE_TICKS, 0);
+    for (unsigned axis = 0; axis < 2; axis++) {
+        const unsigned words = axis == 0 ? X_WORDS : Y_WORDS;
+        uint8_t *const page = slow_image + 64 * (axis + 1);
+        dac_link_put(page + 4 * DAC_LINK_GAIN, 2000);
+        put_words(page + 4 * DAC_LINK_SHAPING_WORD, slow, 5);
+        memcpy(at, from, 2 * words);
+        from += 2 * words;
+        at = put_part(at + 2 * words, words, 1, -20, 5);
+        at = put_part(at, SLOW_WORDS, 2, -8000, 2000);
+        at = put_part(at, KNOTS, 3, 30000, 3000);
+        at = put_part(at, KNOTS, 2, 1000, -700);
+    }
+}
+#endif
+
 static void furnish(void)
 {
     /* sin(2 pi k / 16) in Q2.30 */
@@ -152,6 +212,9 @@ static void furnish(void)
         image[DAC_LINK_PROGRAM + 2 * k] = (uint8_t)word;
         image[DAC_LINK_PROGRAM + 2 * k + 1] = (uint8_t)(word >> 8);
     }
+#if DAC_SLOW_PART
+    put_slow_image();
+#endif
     for (int k = 0; k < 2 * (2 * HARMONICS + 1); k++)
         dac_link_put(fourier + DAC_LINK_PROGRAM + 4 * k, (uint32_t)(80000000 - 11000000 * k));
 }
@@ -165,6 +228,9 @@ typedef struct {
     uint32_t swaps;
     /* of the program that plays, as it was taken */
     dac_word x_table[DAC_TABLE_ROOM(X_BITS)], y_table[DAC_TABLE_ROOM(Y_BITS)];
+#if DAC_SLOW_PART
+    int32_t x_gains[KNOTS], y_gains[KNOTS];
+#endif
 } watch;
 
 static watch watched;
@@ -184,9 +250,33 @@ static uint32_t words_behind(const dac_bank_axis *axis)
 #endif
 }
 
+/* The table of a program; with a slow part others are mixed into it. */
+static const dac_word *table_of(const dac_bank_axis *axis)
+{
+#if DAC_SLOW_PART
+    if (axis->slow != NULL && axis->slow->second != NULL)
+        return axis->fast;
+#endif
+    return axis->table;
+}
+
+#if DAC_SLOW_PART
+static void keep_gains(int32_t *copy, const dac_bank_axis *axis)
+{
+    if (axis->slow != NULL)
+        memcpy(copy, axis->slow->gains, axis->slow->gain_knots * sizeof *copy);
+}
+
+static void watch_gains(const int32_t *copy, const dac_bank_axis *axis)
+{
+    if (axis->slow != NULL)
+        REQUIRE(memcmp(copy, axis->slow->gains, axis->slow->gain_knots * sizeof *copy) == 0);
+}
+#endif
+
 static void keep_table(dac_word *copy, const dac_bank_axis *axis)
 {
-    memcpy(copy, axis->table, (axis->length + words_behind(axis)) * sizeof *copy);
+    memcpy(copy, table_of(axis), (axis->length + words_behind(axis)) * sizeof *copy);
     for (uint32_t k = 0; k < words_behind(axis); k++)
         REQUIRE(copy[axis->length + k] == copy[k]);
 }
@@ -204,9 +294,17 @@ static void watch_memory(const dac_sequencer *s, watch *w)
         REQUIRE(bank->y.code_min >= CODE_MIN && bank->y.code_max <= CODE_MAX && bank->y.max_step <= MAX_STEP);
         keep_table(w->x_table, &bank->x);
         keep_table(w->y_table, &bank->y);
+#if DAC_SLOW_PART
+        keep_gains(w->x_gains, &bank->x);
+        keep_gains(w->y_gains, &bank->y);
+#endif
     }
-    REQUIRE(memcmp(w->x_table, bank->x.table, (bank->x.length + words_behind(&bank->x)) * sizeof(dac_word)) == 0);
-    REQUIRE(memcmp(w->y_table, bank->y.table, (bank->y.length + words_behind(&bank->y)) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(w->x_table, table_of(&bank->x), (bank->x.length + words_behind(&bank->x)) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(w->y_table, table_of(&bank->y), (bank->y.length + words_behind(&bank->y)) * sizeof(dac_word)) == 0);
+#if DAC_SLOW_PART
+    watch_gains(w->x_gains, &bank->x);
+    watch_gains(w->y_gains, &bank->y);
+#endif
 }
 
 static void watch_memories(void)
@@ -282,9 +380,18 @@ static void fill_one(dac_sequencer *s, watch *w, dac_tick *played, unsigned tick
     uint8_t markers[MOST_FILL];
 
     memcpy(&before, s, sizeof before);
+#if DAC_SLOW_PART
+    dac_word x_before[DAC_TABLE_ROOM(X_BITS)], y_before[DAC_TABLE_ROOM(Y_BITS)];
+    memcpy(x_before, x_mixed, sizeof x_before);
+    memcpy(y_before, y_mixed, sizeof y_before);
+#endif
     dac_sequencer_fill(s, codes, codes + 1, markers, ticks);
     memcpy(&filled, s, sizeof filled);
     memcpy(s, &before, sizeof before);
+#if DAC_SLOW_PART
+    memcpy(x_mixed, x_before, sizeof x_before);
+    memcpy(y_mixed, y_before, sizeof y_before);
+#endif
     for (unsigned i = 0; i < ticks; i++) {
         step(s, w, &played[i]);
         REQUIRE(played[i].x == codes[2 * i] && played[i].y == codes[2 * i + 1] && played[i].markers == markers[i]);
@@ -415,7 +522,11 @@ static void say_tagged(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_
     say(type, seq, whole + 6, (uint8_t)(count + 16));
 }
 
+#if DAC_SLOW_PART
+static uint8_t sent[sizeof slow_image];
+#else
 static uint8_t sent[(sizeof fourier > sizeof image ? sizeof fourier : sizeof image) + sizeof image];
+#endif
 static size_t sent_bytes;
 
 /* The image of z behind that of x and y, and what BEGIN says of it; returns the bytes of this. */
@@ -443,15 +554,27 @@ static void upload(uint8_t options, const uint8_t *changes, size_t count)
     const uint8_t shapes[] = {X_BITS + cubic, 16, 16, 0, Y_BITS + cubic, 16, 16, 0};
     uint32_t crc = DAC_LINK_CRC;
 
+#if DAC_SLOW_PART
+    const bool has_slow = (options & SLOW) != 0;
+    const size_t first = has_slow ? sizeof slow_image : as_fourier ? sizeof fourier : sizeof image;
+    memcpy(sent, has_slow ? slow_image : as_fourier ? fourier : image, first);
+#else
     const size_t first = as_fourier ? sizeof fourier : sizeof image;
-    sent_bytes = first;
     memcpy(sent, as_fourier ? fourier : image, first);
+#endif
+    sent_bytes = first;
     memcpy(info + 40, shapes, sizeof shapes);
     const uint8_t info_bytes = add_z(options, info);
     for (size_t i = 0; i + 1 < count; i += 2) {
         uint8_t *const at = sent + (sent_bytes != first && (i & 2) != 0 ? first + changes[i] % sizeof image
                                                                       : changes[i] % first);
+#if DAC_SLOW_PART
+        uint8_t *const behind = sent + (DAC_LINK_PROGRAM + changes[i]) % first;
+        uint8_t *const place = (i & 2) != 0 && has_slow ? behind : at;
+        *place = (uint8_t)(*place + changes[i + 1]);
+#else
         *at = (uint8_t)(*at + changes[i + 1]);
+#endif
     }
     for (size_t i = 0; i < sent_bytes; i++)
         crc = dac_link_crc(crc, sent[i]);
@@ -483,6 +606,26 @@ static void commit(uint8_t seq, uint8_t mode, uint8_t bytes)
     payload[4] = mode;
     say_tagged(DAC_LINK_COMMIT, seq, payload, bytes, digest);
 }
+
+#if DAC_MOVE
+/* A MOVE of the program that plays, to the words of the last upload with changes; with factors if that has slow parts. */
+static void move(uint8_t seq, uint8_t options, const uint8_t *changes, size_t count)
+{
+    uint8_t payload[DAC_LINK_MOVE_BYTES + DAC_LINK_FACTOR_BYTES] = {0};
+    const uint8_t bytes = DAC_SLOW_PART && (options & SLOW) ? sizeof payload : DAC_LINK_MOVE_BYTES;
+
+    dac_link_put(payload, dac_sequencer_status(&sequencer).swaps);
+    for (unsigned axis = 0; axis < 2; axis++) {
+        memcpy(payload + 4 + 12 * axis, sent + 64 * (axis + 1) + 4 * DAC_LINK_GAIN, 12);
+        dac_link_put(payload + DAC_LINK_MOVE_BYTES + 4 * axis, 60000);
+    }
+    for (size_t i = 0; i + 1 < count; i += 2) {
+        uint8_t *const at = payload + changes[i] % bytes;
+        *at = (uint8_t)(*at + changes[i + 1]);
+    }
+    say_tagged(DAC_LINK_MOVE, seq, payload, bytes, NULL);
+}
+#endif
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
@@ -556,6 +699,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             say_tagged(command & 15, command < 0x50 ? ++seq : seq, data, (uint8_t)(count < 228 ? count : 228), NULL);
         else if (command == 0x61)
             upload(options, data, count);
+#if DAC_MOVE
+        else if (command == 0x68)
+            move(++seq, options, data, count);
+#endif
         else
             feed(data, count);
         data += count;
