@@ -15,6 +15,7 @@ import statistics
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -26,7 +27,6 @@ from replacing import replace  # noqa: E402
 from turned_scans import turned_setup, write_turned  # noqa: E402
 
 from tablegen.api.live import Live  # noqa: E402
-from tablegen.api.live_preview import LivePreview  # noqa: E402
 from tablegen.config.load import load  # noqa: E402
 from tablegen.link.messages import SPLINE_DEGREE, DeviceInfo, Feature, More  # noqa: E402
 from tablegen.link.prepare import PreparedScan  # noqa: E402
@@ -92,38 +92,37 @@ def moved(path: Path, info: DeviceInfo) -> None:
     """Move a scan on a device with modes of a COMMIT, and print the medians."""
     info = replace(info, features=info.features | Feature.COMMIT_MODES)
     line = _TimedLine(model(info), baud=_BAUD, tick_hz=info.update_rate_hz, out_s=_WAY_S, back_s=_WAY_S)
-    previews: list[tuple[float, float, int]] = []
-    uploads: list[tuple[float, float, int]] = []
+    taken: list[tuple[float, float, int]] = []  # when the device said that a program plays
     with client(line) as device:
-        upload = device.upload
-
-        def timed_upload(*arguments: object, **options: object) -> object:
-            result = upload(*arguments, **options)  # type: ignore[arg-type]
-            uploads.append(now())
-            return result
-
-        device.upload = timed_upload  # type: ignore[assignment, method-assign]
         exchange = device._session.exchange
 
         def now() -> tuple[float, float, int]:
             return time.process_time() - line.model_s, line.now(), exchange.bytes_sent
 
-        def note(_: LivePreview) -> None:
-            previews.append(now())
+        def timed(play: Callable[..., object]) -> Callable[..., object]:
+            def played(*arguments: object, **options: object) -> object:
+                result = play(*arguments, **options)
+                taken.append(now())
+                return result
 
-        live = Live(device, path, on_preview=note)
+            return played
+
+        for name in ("upload", "move"):
+            setattr(device, name, timed(getattr(device, name)))
+        live = Live(device, path)
         live.start()
         rows: dict[str, tuple[list[float], list[float], list[int]]] = {
             name: ([], [], []) for name in ("preview", "exact")
         }
         errors = []
         for by_nm in MOVES_NM:
+            taken.clear()
             start = now()
             scan = live.move(by_nm, by_nm)
-            end = uploads[-1]
             assert scan.preview is not None
+            preview, exact = taken
             errors.append(max(scan.preview.x_error_percent, scan.preview.y_error_percent))
-            for name, at in (("preview", previews[-1]), ("exact", end)):
+            for name, at in (("preview", preview), ("exact", exact)):
                 for values, before, after in zip(rows[name], start, at, strict=True):
                     values.append(after - before)  # type: ignore[arg-type]
     print("            CPU ms   line ms    all ms  bytes sent")

@@ -4,16 +4,18 @@ The parts of the drive that plays are scaled, so that the operator of each axis 
 line and of the frame about the new place. Only their shapes stay those of the scan before.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from msgspec import Struct, structs
+from msgspec import structs
 
 from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.compensation.operator.operator import CENTRE_REACH
 from tablegen.compensation.operator.turned_frame import FrameDrive, FrameMotion
 from tablegen.config.load import Setup
 from tablegen.device.dual_program import ScanProgram
+from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.frame_program import FrameProgram, played_bounds, played_extremes
 from tablegen.fixedpoint.frame_words import FrameMove
 from tablegen.numerics.arrays import Floats
@@ -29,25 +31,59 @@ from tablegen.planning.turned_plan import (
 )
 from tablegen.waveform.series import FourierSeries
 
-_ROUNDS = 1
-_SAMPLES = 128  # of a line
-_SAMPLES_OF_ROUNDS = 64  # before the last play, which gives the error
+_SAMPLES = 128  # of a line, for the error
+_SAMPLES_OF_SCALES = 64
 _MOST_LINES = 24  # of a frame that are played
 _LEAST_SHARE = 0.02  # of the longer motion: a part that is shorter is not made longer
 
 
-class TurnedPreview(Struct, frozen=True, eq=False):
-    """Both axes of a preview, and their largest distances from the wanted position by the operators.
+@dataclass(frozen=True, eq=False)
+class _Scaled:
+    """An axis of a preview: the words that make its program, and how it is to move by its drive."""
 
-    They are in percent of the longer motion of each axis. ``moves`` are the words of x and y that make the program of
-    that which plays. ``program_of_z`` is that of the plan behind the preview.
+    axis: TurnedAxis
+    program: FrameProgram
+    move: FrameMove
+    motion: FrameMotion
+    drive: FrameDrive
+
+    @cached_property
+    def error_percent(self) -> float:
+        """The largest distance from the wanted position by the operator, in percent of the longer motion."""
+        return 100.0 * _played(self.axis, self.motion, self.drive, _SAMPLES)[2] / self.motion.longest_nm
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedPreview:
+    """Both axes of a preview. ``program_of_z`` is that of the plan behind it.
+
+    Its errors are worked out when they are asked for, since no check needs them: a preview can play before.
     """
 
-    program: ScanProgram
-    moves: tuple[FrameMove, FrameMove]
-    x_error_percent: float
-    y_error_percent: float
+    x: _Scaled
+    y: _Scaled
+    schedule: Schedule
     program_of_z: ScanProgram | None = None
+
+    @property
+    def program(self) -> ScanProgram:
+        """The program that plays with other words."""
+        return ScanProgram(self.x.program, self.y.program, self.schedule)
+
+    @property
+    def moves(self) -> tuple[FrameMove, FrameMove]:
+        """The words of x and y that make it of the program that plays."""
+        return self.x.move, self.y.move
+
+    @property
+    def x_error_percent(self) -> float:
+        """The largest distance of x from the wanted position by its operator, in percent of its longer motion."""
+        return self.x.error_percent
+
+    @property
+    def y_error_percent(self) -> float:
+        """The same of y."""
+        return self.y.error_percent
 
 
 def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
@@ -71,26 +107,20 @@ def turned_preview(setup: Setup, plan: TurnedPlan) -> TurnedPreview | None:
     shares, tilts = geometry.shares, plan_tilts(setup, new, request.x.harmonics, geometry, problems)
     if problems.entries or tilts.keys() != {tilt.name for tilt in plan.tilts}:
         return None
-    programs, moves, errors = [], [], []
+    scaled = []
     for axis, voltages in zip(plan.axes, (request.x.voltages, request.y.voltages), strict=True):
         try:
-            program, move, error = _scaled(setup, axis, voltages.driver.share(voltages.v_offset), *shares[axis.axis])
+            one = _scaled(setup, axis, voltages.driver.share(voltages.v_offset), *shares[axis.axis])
         except (Unphysical, OverflowError):
             return None
-        if program is None:
+        if one is None:
             return None
-        programs.append(program)
-        moves.append(move)
-        errors.append(error)
-    program_of_z = structs.replace(plan, **tilts).program_of_z
-    both = ScanProgram(programs[0], programs[1], old)
-    return TurnedPreview(both, (moves[0], moves[1]), errors[0], errors[1], program_of_z)
+        scaled.append(one)
+    return TurnedPreview(scaled[0], scaled[1], old, structs.replace(plan, **tilts).program_of_z)
 
 
-def _scaled(
-    setup: Setup, axis: TurnedAxis, middle: float, fast_nm: float, slow_nm: float
-) -> tuple[FrameProgram | None, FrameMove, float]:
-    """Return the program of an axis with its parts scaled, None if it leaves a limit; its words, and its error in %.
+def _scaled(setup: Setup, axis: TurnedAxis, middle: float, fast_nm: float, slow_nm: float) -> _Scaled | None:
+    """Scale the parts of an axis; None if it leaves a limit.
 
     ``middle`` is the offset of the new place, of v_max.
     """
@@ -101,16 +131,14 @@ def _scaled(
     longest = max(motion.longest_nm, axis.motion.longest_nm)
     fast = _ratio(fast_nm, axis.motion.fast_nm, _LEAST_SHARE * longest)
     slow = _ratio(slow_nm, axis.motion.slow_nm, _LEAST_SHARE * longest)
-    for number in range(_ROUNDS + 1):
-        drive = _drive(axis.drive, fast, slow, centre)
-        samples = _SAMPLES_OF_ROUNDS if number < _ROUNDS else _SAMPLES
-        moved_fast, moved_slow, error_nm = _played(axis, motion, drive, samples)
-        if number < _ROUNDS:
-            fast *= fast_nm / moved_fast if abs(moved_fast) > _LEAST_SHARE * abs(fast_nm) else 1.0
-            slow *= slow_nm / moved_slow if abs(moved_slow) > _LEAST_SHARE * abs(slow_nm) else 1.0
+    moved_fast, moved_slow, _ = _played(axis, motion, _drive(axis.drive, fast, slow, centre), _SAMPLES_OF_SCALES)
+    fast *= fast_nm / moved_fast if abs(moved_fast) > _LEAST_SHARE * abs(fast_nm) else 1.0
+    slow *= slow_nm / moved_slow if abs(moved_slow) > _LEAST_SHARE * abs(slow_nm) else 1.0
+    drive = _drive(axis.drive, fast, slow, centre)
     check_reach(axis.known, drive, motion.lines)
     move = FrameMove.of(axis.program, fast, slow, axis.converter.code(axis.known.driver.volts(centre)))
-    return _guarded(setup, axis, move.program(axis.program)), move, 100.0 * error_nm / motion.longest_nm
+    program = _guarded(setup, axis, move.program(axis.program))
+    return None if program is None else _Scaled(axis, program, move, motion, drive)
 
 
 def _guarded(setup: Setup, axis: TurnedAxis, program: FrameProgram) -> FrameProgram | None:
