@@ -209,7 +209,7 @@ def test_compiled_programs_are_images_of_uploads() -> None:
 @pytest.mark.rest
 def test_programs_with_slow_parts_are_kept_and_play_by_number() -> None:
     seen: Counter[Any] = Counter()
-    for seed in range(6):
+    for seed in range(8):
         how = {"store": True, "slow": True, "plays": True, "modes": True, "moves": seed % 2 == 1}
         dialogue = Dialogue(SHAPES["cubic"], seed, KEY if seed > 3 else b"", **how)
         dialogue.play(250)
