@@ -28,7 +28,8 @@
 
 enum { X_BITS = 4, Y_BITS = 3, X_WORDS = 1 << X_BITS, Y_WORDS = 1 << Y_BITS, HARMONICS = 3 };
 enum { LINE_TICKS = 24, LINES = 3 };
-enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64, Z = 128, SLOW = 128 };
+enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64, Z = 128 };
+enum { SLOW = 128 };
 enum { MOST_TICKS = 1500, MOST_FILL = 64, POWER_UP = 2000 };
 enum { CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000 };
 
@@ -608,7 +609,7 @@ static void commit(uint8_t seq, uint8_t mode, uint8_t bytes)
 }
 
 #if DAC_MOVE
-/* A MOVE of the program that plays, to the words of the last upload with changes; with factors if that has slow parts. */
+/* A MOVE of the program that plays, to the words of the last upload with changes; with factors if it has slow parts. */
 static void move(uint8_t seq, uint8_t options, const uint8_t *changes, size_t count)
 {
     uint8_t payload[DAC_LINK_MOVE_BYTES + DAC_LINK_FACTOR_BYTES] = {0};
